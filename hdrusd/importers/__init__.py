@@ -1,0 +1,1 @@
+"""One file a legacy format; each reads into a ``legacy.scene.LegacyScene``."""

@@ -1,0 +1,159 @@
+"""The importer interface, the list of importers, and the door through which they open files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import Protocol
+
+from hdrusd.errors import InputError, SourceRef
+from hdrusd.legacy.scene import LegacyScene
+from hdrusd.registry import Registry
+from hdrusd.report import Kind, Report
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a hostile file may cost us. A declared size is never believed beyond these."""
+
+    file_bytes: int = 2 << 30
+    pixels: int = 16384 * 16384
+    vertices: int = 100_000_000
+    nodes: int = 1_000_000
+    depth: int = 256
+
+
+@dataclass(slots=True)
+class Resolver:
+    """Opens files for a reader, and only below the declared roots.
+
+    Links are followed before the check, only regular files are opened, and no
+    file above ``limits.file_bytes`` is read. Roots are the input's own folder
+    and those that the user declares.
+    """
+
+    source: Path
+    report: Report
+    roots: Sequence[Path] = ()
+    search: Sequence[Path] = ()
+    limits: Limits = field(default_factory=Limits)
+
+    def __post_init__(self) -> None:
+        base = self.source.resolve().parent
+        self.search = [Path(p).resolve() for p in self.search]
+        self.roots = [base, *(Path(p).resolve() for p in self.roots), *self.search]
+
+    def read(self, path: Path | None = None) -> bytes:
+        """The bytes of ``path``, or of the source itself. Raises InputError."""
+        path = self.source if path is None else path
+        if not path.exists():
+            raise InputError(SourceRef(path), "no such file")
+        if not path.is_file():
+            raise InputError(SourceRef(path), "not a regular file")
+        size = path.stat().st_size
+        if size > self.limits.file_bytes:
+            raise InputError(
+                SourceRef(path), f"{size} bytes; at most {self.limits.file_bytes} are read"
+            )
+        return path.read_bytes()
+
+    def find(self, reference: str, place: SourceRef, *, thing: str = "") -> Path | None:
+        """The file that a reference names, or None with a finding.
+
+        Tried in turn: as written beside the source; its base name in the folders
+        ``textures``, ``materials/textures``, ``../materials/textures`` and the
+        search paths; then each without regard to case. Backslashes and trailing
+        blanks are mended. A hit outside the roots is refused.
+        """
+        name = reference.strip().replace("\\", "/")
+        if not name or "\0" in name:
+            self.report.add(
+                Kind.MISSING, "file-missing", place, thing, f"{reference!r}: not a file name"
+            )
+            return None
+        base = self.source.resolve().parent
+        tail = PurePosixPath(name).name
+        folders = [
+            base,
+            base / "textures",
+            base / "materials" / "textures",
+            base.parent / "materials" / "textures",
+            *self.search,
+        ]
+        candidates = [base / name, *(folder / tail for folder in folders)]
+        refused = False
+        for candidate in candidates:
+            found = _existing(candidate)
+            if found is None:
+                continue
+            if not self.allowed(found):
+                refused = True
+                continue
+            if found.name != tail or found.parent != candidate.parent:
+                self.report.add(
+                    Kind.ASSUMED,
+                    "file-found-elsewhere",
+                    place,
+                    thing,
+                    f"{reference}: not found as written; {found.name} is used",
+                )
+            return found
+        why = (
+            "outside the declared roots; add --root"
+            if refused
+            else "not found; add --search-path"
+        )
+        code = "file-refused" if refused else "file-missing"
+        self.report.add(Kind.MISSING, code, place, thing, f"{reference}: {why}")
+        return None
+
+    def allowed(self, path: Path) -> bool:
+        """Whether a regular file lies, links followed, below one of the roots."""
+        real = path.resolve()
+        return real.is_file() and any(real.is_relative_to(root) for root in self.roots)
+
+
+def _existing(path: Path) -> Path | None:
+    """``path`` as it stands or without regard to case in its last part; None if neither is there."""
+    try:
+        if path.exists():
+            return path.resolve()
+        if path.parent.is_dir():
+            wanted = path.name.casefold()
+            for entry in sorted(os.listdir(path.parent)):
+                if entry.casefold() == wanted:
+                    return (path.parent / entry).resolve()
+    except (OSError, ValueError):  # a name too long or unspeakable for this file system
+        return None
+    return None
+
+
+class Importer(Protocol):
+    """What a format must offer: one call."""
+
+    def __call__(self, resolver: Resolver, report: Report) -> LegacyScene:
+        """Read ``resolver.source``. Raises InputError when nothing can be used."""
+        ...
+
+
+#: Name of the format to its reader.
+IMPORTERS: Registry[Importer] = Registry("importer", "hdrusd.importers")
+IMPORTERS.add("gltf", "hdrusd.importers.gltf:read")
+IMPORTERS.add("obj", "hdrusd.importers.obj:read")
+IMPORTERS.add("osg", "hdrusd.importers.osg:read")
+
+#: File suffix (lower case) to the name of its format.
+SUFFIXES = {".gltf": "gltf", ".glb": "gltf", ".obj": "obj", ".osg": "osg", ".osgt": "osg"}
+
+
+def read(resolver: Resolver, report: Report) -> LegacyScene:
+    """Read a legacy file by its suffix. Raises InputError."""
+    suffix = resolver.source.suffix.lower()
+    name = SUFFIXES.get(suffix, suffix.removeprefix("."))
+    if name not in IMPORTERS.names():
+        raise InputError(
+            resolver.source, f"{suffix or 'no suffix'}: no reader; want {', '.join(SUFFIXES)}"
+        )
+    return IMPORTERS[name](resolver, report)

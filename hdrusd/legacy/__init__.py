@@ -1,0 +1,1 @@
+"""What legacy files say, in their own numbers, before anyone interprets it."""
