@@ -1,0 +1,1 @@
+"""The paper's section 3 in NumPy: lights in candela, textures as reflectance."""

@@ -1,0 +1,164 @@
+"""Pictures in and out: textures by OpenImageIO, frames by OpenEXR, in cd/m2.
+
+An EXR that we write holds linear Rec. 709 RGB, float32 (half on request), 1.0 =
+1 cd/m2, and says so: ``whiteLuminance`` 1 and ``chromaticities`` (OpenEXR standard
+attributes). Files appear under their name only when they are whole.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import OpenEXR
+import OpenImageIO as oiio
+
+from hdrusd.errors import InputError
+from hdrusd.scene import ImageData
+
+#: Rec. 709 primaries and D65, CIE 1931 xy: red, green, blue, white.
+REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+
+#: A declared size is not believed beyond this many pixels.
+MAX_PIXELS = 16384 * 16384
+
+
+def read_image(path: Path, data: bytes | None = None) -> ImageData:
+    """Decode a texture: (h, w, 1 to 4) uint8, float16 or float32, top row first.
+
+    ``data``: the encoded bytes, when the file lies in a package or another file;
+    ``path`` then only names it. 16-bit integers come back as float32 in [0, 1].
+    Raises InputError.
+    """
+    if data is None and not path.is_file():
+        raise InputError(path, "no such image")
+    with tempfile.TemporaryDirectory() as folder:
+        real = path
+        if data is not None:  # OpenImageIO's memory reader knows few formats
+            real = Path(folder) / Path(path.name.rstrip("]")).name
+            real.write_bytes(data)
+        return _decode(real, path)
+
+
+def _decode(real: Path, named: Path) -> ImageData:
+    picture = oiio.ImageInput.open(str(real))
+    if picture is None:
+        raise InputError(named, f"not a readable image ({_first_line(oiio.geterror())})")
+    try:
+        spec = picture.spec()
+        if spec.width * spec.height > MAX_PIXELS or spec.width < 1 or spec.height < 1:
+            raise InputError(named, f"{spec.width} x {spec.height} pixels; want 1 to {MAX_PIXELS}")
+        if real.stat().st_size * 10_000 < spec.width * spec.height:  # no codec packs that tight
+            raise InputError(named, f"{spec.width} x {spec.height} pixels declared, not there")
+        kind = {"uint8": oiio.UINT8, "half": oiio.HALF}.get(str(spec.format), oiio.FLOAT)
+        channels = min(spec.nchannels, 4)
+        pixels = picture.read_image(0, 0, 0, channels, kind)
+        if pixels is None:
+            raise InputError(named, f"broken image ({_first_line(picture.geterror())})")
+        array = np.asarray(pixels).reshape(spec.height, spec.width, channels)
+        return ImageData(array, named)
+    finally:
+        picture.close()
+
+
+def _first_line(text: str) -> str:
+    return (text.strip().splitlines() or ["unknown format"])[0]
+
+
+def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
+    """Let ``write`` fill a temporary file beside ``path``, then rename it to ``path``.
+
+    The temporary name keeps the suffix, by which libraries choose the format. On
+    any failure it is removed and ``path`` stays as it was.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+    try:
+        write(temporary)
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def write_exr(
+    path: Path,
+    rgb: npt.NDArray[np.floating[Any]],
+    attributes: Mapping[str, Any] | None = None,
+    *,
+    half: bool = False,
+    luminance: bool = True,
+) -> None:
+    """Write linear Rec. 709 RGB or RGBA, (h, w, 3 or 4), top row first.
+
+    ``luminance``: the values are cd/m2 and the header says so; False for
+    reflectance maps. ``attributes``: further header entries (str, int, float,
+    NumPy arrays of 9 or 16 floats).
+    """
+    dtype = np.float16 if half else np.float32
+    pixels = np.ascontiguousarray(rgb, dtype)
+    header: dict[str, Any] = {
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        "chromaticities": REC709,
+        "software": "hdrusd",
+    }
+    if luminance:
+        header["whiteLuminance"] = 1.0
+    header.update(attributes or {})
+    channels = {"RGBA" if pixels.shape[2] == 4 else "RGB": pixels}
+
+    def write(temporary: Path) -> None:
+        with OpenEXR.File(header, channels) as file:
+            file.write(str(temporary))
+
+    write_atomically(path, write)
+
+
+def read_exr(path: Path) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
+    """RGB as (h, w, 3) float32 and the header; grey is spread over three channels.
+
+    Values are multiplied by ``whiteLuminance`` where a file has another than 1,
+    so that 1.0 is 1 cd/m2. Raises InputError.
+    """
+    if not path.is_file():
+        raise InputError(path, "no such file")
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            header = dict(file.header())
+            channels = {name: np.asarray(c.pixels) for name, c in file.channels().items()}
+    except (RuntimeError, ValueError, TypeError) as problem:
+        raise InputError(path, f"not a readable EXR ({_first_line(str(problem))})") from problem
+    names = [n for n in ("R", "G", "B") if n in channels] or [n for n in ("Y",) if n in channels]
+    if len(names) not in (1, 3):
+        raise InputError(path, f"channels {', '.join(sorted(channels))}; want R, G, B or Y")
+    rgb = np.stack([channels[names[i % len(names)]].astype(np.float32) for i in range(3)], axis=-1)
+    white = float(header.get("whiteLuminance", 1.0))
+    return (rgb if white == 1.0 else (rgb * white).astype(np.float32)), header
+
+
+def write_png(path: Path, pixels: npt.NDArray[np.uint8], comment: str = "") -> None:
+    """Write display-encoded sRGB, (h, w, 3) uint8, top row first."""
+    h, w, channels = pixels.shape
+
+    def write(temporary: Path) -> None:
+        spec = oiio.ImageSpec(w, h, channels, oiio.UINT8)
+        spec.attribute("oiio:ColorSpace", "sRGB")
+        spec.attribute("png:compressionLevel", 4)
+        if comment:
+            spec.attribute("ImageDescription", comment)
+        out = oiio.ImageOutput.create(str(temporary))
+        if out is None or not out.open(str(temporary), spec):
+            raise OSError(f"{path}: cannot be written: {oiio.geterror()}")
+        try:
+            if not out.write_image(np.ascontiguousarray(pixels)):
+                raise OSError(f"{path}: {out.geterror()}")
+        finally:
+            out.close()
+
+    write_atomically(path, write)

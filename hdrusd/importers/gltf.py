@@ -1,0 +1,82 @@
+"""glTF 2.0 and GLB to a LegacyScene (ISO/IEC 12113:2022 and the extensions named below)."""
+
+from __future__ import annotations
+
+from hdrusd.importers.gltf_accessors import Accessors
+from hdrusd.importers.gltf_animations import read_animations
+from hdrusd.importers.gltf_cameras import read_cameras
+from hdrusd.importers.gltf_document import Document, load
+from hdrusd.importers.gltf_images import Textures
+from hdrusd.importers.gltf_lights import EXTENSION, read_lights
+from hdrusd.importers.gltf_materials import default_material, read_materials
+from hdrusd.importers.gltf_meshes import MeshReader
+from hdrusd.importers.gltf_nodes import NodeReader
+from hdrusd.importers.importer import Resolver
+from hdrusd.legacy.scene import LegacyScene
+from hdrusd.report import Kind, Report
+
+#: Extensions that are read. KHR_texture_basisu is, in that each such image is a finding.
+EXTENSIONS = frozenset(
+    {
+        EXTENSION,
+        "KHR_materials_emissive_strength",
+        "KHR_materials_pbrSpecularGlossiness",
+        "KHR_materials_unlit",
+        "KHR_mesh_quantization",
+        "KHR_texture_basisu",
+        "KHR_texture_transform",
+        "EXT_texture_webp",
+    }
+)
+
+
+def read(resolver: Resolver, report: Report) -> LegacyScene:
+    """Read ``resolver.source``, a .gltf or .glb file, and the files it refers to.
+
+    One glTF mesh becomes one entry of ``meshes`` per primitive of triangles; nodes share
+    them. Metres, +Y up, lights in candela or lux, emission in cd/m2.
+
+    Raises InputError where the container, the JSON, a buffer, the node tree or a required
+    extension cannot be used, or where nothing that can be shown is left.
+    """
+    document = load(resolver, report)
+    _check_extensions(document)
+    accessors = Accessors(document, resolver)
+    materials = read_materials(document, Textures(document, accessors, resolver))
+    lights, light_numbers = read_lights(document)
+    meshes = MeshReader(document, accessors, materials)
+    if any(mesh.material == meshes.default_material for mesh in meshes.meshes):
+        materials.append(default_material(document))
+    animations = read_animations(document, accessors)
+    nodes = NodeReader(document, meshes.by_mesh, light_numbers, animations)
+    scene = LegacyScene(
+        source=resolver.source,
+        format="gltf",
+        roots=nodes.roots(),
+        meshes=meshes.meshes,
+        materials=materials,
+        lights=lights,
+        cameras=read_cameras(document),
+        generator=document.root.child("asset").text("generator"),
+    )
+    if not (scene.meshes or scene.lights or scene.cameras):
+        if meshes.errors:
+            raise meshes.errors[0]
+        text = "no mesh, light or camera in the file"
+        document.root.note(Kind.MISSING, "scene-empty", text)
+    return scene
+
+
+def _check_extensions(document: Document) -> None:
+    for name in _names(document, "extensionsRequired"):
+        if name not in EXTENSIONS:
+            raise document.root.error(f"requires the extension {name[:80]}, which is not read")
+    for name in _names(document, "extensionsUsed"):
+        if name not in EXTENSIONS:
+            text = f"extension {name[:80]} is not read"
+            document.root.note(Kind.DROPPED, "extension-unknown", text)
+
+
+def _names(document: Document, key: str) -> list[str]:
+    values = document.data.get(key, [])
+    return [v for v in values if isinstance(v, str)] if isinstance(values, list) else []

@@ -1,0 +1,187 @@
+"""Buffers, buffer views and accessors of glTF: declared sizes to arrays, bounds first.
+
+glTF 2.0 specification, sections 3.6.1 (buffers, views) and 3.6.2 (accessors, sparse
+accessors), 3.11 for normalized integers. An accessor becomes a NumPy view onto the bytes
+of the file only after Python integers have shown that it lies inside them, so a huge
+count costs nothing.
+"""
+
+from __future__ import annotations
+
+import binascii
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, unquote_to_bytes
+
+import numpy as np
+import numpy.typing as npt
+
+from hdrusd.importers.gltf_document import Document, Item
+from hdrusd.importers.importer import Resolver
+from hdrusd.legacy.scene import Floats
+from hdrusd.report import Kind
+
+_DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+
+#: A sparse accessor may start from zeros that no byte of the file backs; more is refused.
+_ZERO_BASE_BYTES = 64 << 20
+
+Elements = npt.NDArray[Any]
+
+
+class Accessors:
+    """All buffers of a document, and arrays made from them.
+
+    Buffers are loaded at once: a missing one leaves nothing worth having, so it is an
+    InputError.
+    """
+
+    def __init__(self, document: Document, resolver: Resolver) -> None:
+        self._document = document
+        self._floats: dict[int, Floats] = {}
+        files: dict[Path, memoryview] = {}
+        self._buffers = [
+            self._buffer(position, item, resolver, files)
+            for position, item in enumerate(document.table("buffers"))
+        ]
+        #: Bytes of all buffers together: what distinct views into them can at most add up to.
+        self.size = sum(len(buffer) for buffer in self._buffers)
+
+    def floats(self, index: int, *widths: int) -> Floats:
+        """(count, n) float32 with n among ``widths``; normalized integers become -1 to 1.
+
+        Raises InputError when the accessor is broken or reaches past its bytes.
+        """
+        if index not in self._floats:
+            self._floats[index] = self._to_floats(index)
+        values = self._floats[index]
+        if values.shape[1] not in widths:
+            item = self._document.table("accessors")[index]
+            wanted = " or ".join(str(width) for width in widths)
+            raise item.error(f"{values.shape[1]} numbers an element; want {wanted}")
+        return values
+
+    def integers(self, index: int) -> Elements:
+        """(count,) unsigned integers. Raises InputError."""
+        item = self._document.table("accessors")[index]
+        values = self._elements(item)
+        if values.dtype.kind != "u" or values.shape[1] != 1:
+            raise item.error("not unsigned SCALAR; want that for indices")
+        return np.ascontiguousarray(values[:, 0])
+
+    def view(self, index: int) -> memoryview:
+        """The bytes of a buffer view, as many as are there. Raises InputError."""
+        item = self._document.table("bufferViews")[index]
+        buffer_index = item.index("buffer", "buffers")
+        length = item.integer("byteLength")
+        if buffer_index is None or length is None:
+            raise item.error("no usable buffer and byteLength")
+        buffer = self._buffers[buffer_index]
+        start = item.integer("byteOffset") or 0
+        if start + length > len(buffer):
+            text = f"{length} bytes from {start} of a buffer of {len(buffer)}; cut there"
+            item.note(Kind.INVALID, "buffer-view-size", text)
+        return buffer[start : start + length]
+
+    def _buffer(
+        self, position: int, item: Item, resolver: Resolver, files: dict[Path, memoryview]
+    ) -> memoryview:
+        declared = item.integer("byteLength")
+        uri = item.text("uri")
+        if uri.startswith("data:"):
+            content = memoryview(data_uri(item, uri))
+        elif uri:
+            path = resolver.find(unquote(uri), item.ref, thing=item.name)
+            if path is None:
+                raise item.error(f"buffer {uri[:200]}: not found or outside the declared roots")
+            if path not in files:
+                files[path] = memoryview(resolver.read(path))
+            content = files[path]
+        elif position == 0 and self._document.binary is not None:
+            content = self._document.binary
+        else:
+            raise item.error("buffer without uri and without a GLB chunk; want its bytes")
+        if declared is None:
+            return content
+        if declared > len(content):
+            text = f"byteLength {declared}, but there are {len(content)} bytes; those are used"
+            item.note(Kind.INVALID, "buffer-size", text)
+        return content[:declared]
+
+    def _to_floats(self, index: int) -> Floats:
+        item = self._document.table("accessors")[index]
+        values = self._elements(item)
+        if values.dtype.kind == "f":
+            return np.require(values, np.float32, ["C", "A"])
+        floats = values.astype(np.float32, order="C")
+        if item.flag("normalized"):
+            floats /= np.float32(np.iinfo(values.dtype).max)
+            np.maximum(floats, np.float32(-1.0), out=floats)
+        return floats
+
+    def _elements(self, item: Item) -> Elements:
+        width = _WIDTHS.get(item.text("type"))
+        dtype = _DTYPES.get(item.integer("componentType") or 0)
+        count = item.integer("count")
+        if width is None or dtype is None or not count:
+            raise item.error("want SCALAR or VEC2 to VEC4, a known componentType and a count")
+        if "bufferView" in item:
+            values = self._strided(item, count, width, np.dtype(dtype))
+        elif "sparse" not in item:
+            raise item.error("neither bufferView nor sparse: there are no data")
+        elif count * width * np.dtype(dtype).itemsize > _ZERO_BASE_BYTES:
+            raise item.error(f"{count} elements of zeros without bytes of their own")
+        else:
+            values = np.zeros((count, width), dtype)
+        return self._substituted(item, values) if "sparse" in item else values
+
+    def _strided(self, item: Item, count: int, width: int, dtype: np.dtype[Any]) -> Elements:
+        index = item.index("bufferView", "bufferViews")
+        if index is None:
+            raise item.error("no usable bufferView")
+        view = self.view(index)
+        element = width * dtype.itemsize
+        view_item = self._document.table("bufferViews")[index]
+        stride = element
+        if "byteStride" in view_item:
+            stride = view_item.integer("byteStride") or 0
+        if stride < element:
+            raise item.error(f"byteStride {stride}; an element takes {element} bytes")
+        start = item.integer("byteOffset") or 0
+        end = start + (count - 1) * stride + element
+        if end > len(view):
+            raise item.error(f"{count} elements reach to byte {end}; the view has {len(view)}")
+        return np.ndarray(
+            (count, width), dtype, buffer=view, offset=start, strides=(stride, dtype.itemsize)
+        )
+
+    def _substituted(self, item: Item, base: Elements) -> Elements:
+        sparse = item.child("sparse")
+        count = sparse.integer("count")
+        where, what = sparse.child("indices"), sparse.child("values")
+        dtype = _DTYPES.get(where.integer("componentType") or 0, "")
+        if not count or not dtype.startswith("<u"):
+            raise sparse.error("want a count and unsigned indices")
+        places = self._strided(where, count, 1, np.dtype(dtype))[:, 0]
+        if int(places.max()) >= len(base):
+            raise where.error(f"index {places.max()}; the accessor has {len(base)} elements")
+        values = base.copy()
+        values[places] = self._strided(what, count, base.shape[1], base.dtype)
+        return values
+
+
+def data_uri(item: Item, uri: str) -> bytes:
+    """The content of a ``data:`` URI (RFC 2397), base64 or percent-encoded. Raises InputError."""
+    head, comma, body = uri.partition(",")
+    if not comma:
+        raise item.error("data URI without a comma")
+    if not head.endswith(";base64"):
+        return unquote_to_bytes(body)
+    try:
+        packed = unquote_to_bytes(body) if "%" in body else body.encode("ascii")
+        packed = packed.translate(None, b" \t\r\n")
+        padding = b"=" * (-len(packed) % 4)  # some writers leave it out
+        return binascii.a2b_base64(packed + padding, strict_mode=True)
+    except (binascii.Error, UnicodeEncodeError) as error:
+        raise item.error(f"data URI: {error}; want base64") from error

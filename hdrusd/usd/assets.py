@@ -1,0 +1,33 @@
+"""Where the files that a stage names are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pxr import Ar, Sdf, Usd
+
+
+def resolved_asset(attribute: Usd.Attribute, asset: Sdf.AssetPath) -> str:
+    """The path that an asset attribute resolves to; what it says when nothing is there.
+
+    A path inside a package keeps USD's form, ``car.usdz[textures/a.png]``.
+    """
+    if asset.resolvedPath:
+        return str(asset.resolvedPath)
+    for spec in attribute.GetPropertyStack(Usd.TimeCode.Default()):
+        anchored = Sdf.ComputeAssetPathRelativeToLayer(spec.layer, asset.path)
+        resolved = Ar.GetResolver().Resolve(anchored)
+        return str(resolved) if resolved else anchored
+    return str(asset.path)
+
+
+def asset_bytes(path: str) -> bytes | None:
+    """The bytes of a file or of a file in a package; None when there is none."""
+    if "[" not in path:
+        file = Path(path)
+        return file.read_bytes() if file.is_file() else None
+    opened = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(path))
+    if not opened:
+        return None
+    buffer = opened.GetBuffer()
+    return bytes(buffer) if buffer is not None else None

@@ -1,0 +1,400 @@
+"""A stage at a time becomes a RenderScene; what does not vary is read once.
+
+The stage is walked once into flat lists (gprims, lights); each frame only asks
+again for what may have changed: matrices, visibility, points, light inputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
+
+from hdrusd.errors import InputError, SourceRef
+from hdrusd.report import Kind, Report
+from hdrusd.scene import LIGHT, NO_CONE, Camera, Draw, Geometry, Material, RenderScene
+from hdrusd.usd.camera import Conform, framing_camera, read_camera
+from hdrusd.usd.instancer import instancer_draws
+from hdrusd.usd.light import light_time_varying, read_dome, read_light_row
+from hdrusd.usd.lux import is_light
+from hdrusd.usd.mesh import GeometryReader, time_varying
+from hdrusd.usd.preview import MaterialReader
+
+#: The sky and camera light of a stage that has no light of its own, lux each.
+DEFAULT_SKY = 1000.0
+
+#: Prims that usdrecord shows and shader 1 has no geometry for.
+_NOT_DRAWN = (UsdGeom.Curves, UsdGeom.Points, UsdGeom.NurbsPatch)
+
+
+@dataclass(slots=True)
+class Piece:
+    """The faces of a gprim that wear one material."""
+
+    faces: npt.NDArray[np.bool_] | None
+    material: int
+    geometry: Geometry | None = None
+
+
+@dataclass(slots=True)
+class Gprim:
+    """One gprim (or instance of one) and what may vary of it."""
+
+    prim: Usd.Prim
+    key: str  # of the geometry: instances share their prototype's
+    pieces: list[Piece]
+    double_sided: bool
+    shape_varies: bool
+    place_varies: bool
+    matrix: npt.NDArray[np.float64] | None = None  # (k, 4, 4) scene units, where it is kept
+    copies: npt.NDArray[np.float64] | None = None  # of a PointInstancer, before ``prim``'s own
+
+
+@dataclass(slots=True)
+class Light:
+    """One light prim and its row, kept unless it varies."""
+
+    prim: Usd.Prim
+    varies: bool
+    row: npt.NDArray[np.void] | None = None
+
+
+@dataclass(slots=True)
+class _Plan:
+    gprims: list[Gprim] = field(default_factory=list)
+    lights: list[Light] = field(default_factory=list)
+    domes: list[Usd.Prim] = field(default_factory=list)
+    instancers: list[Usd.Prim] = field(default_factory=list)
+
+
+class StageReader:
+    """Reads one stage frame by frame.
+
+    ``purposes`` beside "default" that are drawn; ``default_sky``: whether a stage
+    without light is shown under ``DEFAULT_SKY``.
+    """
+
+    def __init__(
+        self,
+        stage: Usd.Stage,
+        report: Report,
+        *,
+        purposes: Iterable[str] = ("render",),
+        default_sky: bool = True,
+    ) -> None:
+        self.stage = stage
+        self.report = report
+        self.unit = _meters_per_unit(stage, report)
+        self.purposes = {"default", *purposes}
+        self.default_sky = default_sky
+        self.materials: list[Material] = []
+        self._material_ids: dict[Sdf.Path | tuple[str, ...], int] = {}
+        self._material_reader = MaterialReader(stage, report)
+        self._plan: _Plan | None = None
+        self._geometries: dict[tuple[str, int], Geometry | None] = {}
+
+    def read(self, time: float, camera: Camera) -> RenderScene:
+        """Everything at a time code, in world metres."""
+        code = Usd.TimeCode(time)
+        cache = UsdGeom.XformCache(code)
+        if self._plan is None:
+            self._plan = self._walk(code)
+        plan = self._plan
+        rows = [row for light in plan.lights if (row := self._light(light, cache)) is not None]
+        lights = np.concatenate(rows) if rows else np.zeros(0, LIGHT)
+        ambient = self._ambient(code)
+        background = (0.0, 0.0, 0.0)
+        if not len(lights) and not any(ambient) and self.default_sky:
+            lights, ambient = _default_light(camera), (DEFAULT_SKY,) * 3
+            self._finding(
+                Kind.ASSUMED, "default-sky", f"no light: shown under {DEFAULT_SKY:g} lx of sky "
+                f"and {DEFAULT_SKY:g} lx from the camera; --disableCameraLight leaves it dark"
+            )
+        draws: list[Draw] = []
+        for gprim in plan.gprims:
+            draws.extend(self._draws(gprim, cache, code))
+        for prim in plan.instancers:
+            if _visible(prim, code):
+                draws.extend(self._instanced(prim, cache, code))
+        return RenderScene(
+            lights=lights,
+            draws=tuple(_merge(draws)),
+            materials=tuple(self.materials),
+            ambient=ambient,
+            background=background,
+            camera=camera,
+            time=time,
+        )
+
+    def camera(
+        self, path: str | None, time: float, aspect: float, conform: Conform = "expandAperture"
+    ) -> Camera:
+        """The camera at ``path``; without one the stage's first, or one that frames the stage."""
+        prim = self.camera_prim(path)
+        code = Usd.TimeCode(time)
+        if prim is None:
+            box = UsdGeom.BBoxCache(code, sorted(self.purposes), useExtentsHint=True)
+            bounds = box.ComputeWorldBound(self.stage.GetPseudoRoot()).ComputeAlignedRange()
+            if bounds.IsEmpty():
+                return Camera()
+            low, high = np.array(bounds.GetMin()), np.array(bounds.GetMax())
+            up = str(UsdGeom.GetStageUpAxis(self.stage))
+            return framing_camera(low * self.unit, high * self.unit, up, aspect)
+        world = UsdGeom.XformCache(code).GetLocalToWorldTransform(prim)
+        return read_camera(
+            prim, code, world, meters_per_unit=self.unit, aspect=aspect, conform=conform
+        )
+
+    def camera_prim(self, path: str | None) -> Usd.Prim | None:
+        """The camera prim by path or by name; the first of the stage when ``path`` is None.
+
+        Raises InputError when it is named and not there.
+        """
+        cameras = [
+            prim
+            for prim in Usd.PrimRange(self.stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
+            if prim.IsA(UsdGeom.Camera)
+        ]
+        if path is None:
+            return cameras[0] if cameras else None
+        for prim in cameras:
+            if path in (str(prim.GetPath()), prim.GetName()):
+                return prim
+        known = ", ".join(str(prim.GetPath()) for prim in cameras) or "none"
+        raise InputError(self._place(), f"{path}: no such camera; the stage has {known}")
+
+    # -- walking the stage ---------------------------------------------------------------
+
+    def _walk(self, code: Usd.TimeCode) -> _Plan:
+        plan = _Plan()
+        walk = iter(Usd.PrimRange(self.stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()))
+        for prim in walk:
+            if not self._wanted(prim):
+                walk.PruneChildren()
+            elif prim.IsA(UsdGeom.PointInstancer):
+                plan.instancers.append(prim)
+                walk.PruneChildren()
+            elif is_light(prim):
+                self._plan_light(plan, prim)
+            elif prim.IsA(UsdGeom.Gprim):
+                gprim = self._plan_gprim(prim, code)
+                if gprim is not None:
+                    plan.gprims.append(gprim)
+        return plan
+
+    def _wanted(self, prim: Usd.Prim) -> bool:
+        """False prunes: hidden for good, or of a purpose that was not asked for."""
+        imageable = UsdGeom.Imageable(prim)
+        if not imageable:
+            return True
+        visibility = imageable.GetVisibilityAttr()
+        if not visibility.ValueMightBeTimeVarying() and visibility.Get() == "invisible":
+            return False
+        purpose = imageable.GetPurposeAttr().Get()
+        return purpose in (None, "default") or purpose in self.purposes
+
+    def _plan_light(self, plan: _Plan, prim: Usd.Prim) -> None:
+        if prim.IsA(UsdLux.DomeLight) or prim.IsA(UsdLux.DomeLight_1):
+            plan.domes.append(prim)
+        elif prim.IsA(UsdLux.NonboundableLightBase) or prim.IsA(UsdLux.BoundableLightBase):
+            varies = light_time_varying(prim) or _place_varies(prim)
+            plan.lights.append(Light(prim, varies))
+        else:
+            self._finding(
+                Kind.DROPPED, "light-unknown", f"{prim.GetTypeName()} light is not shown", prim
+            )
+
+    def _plan_gprim(self, prim: Usd.Prim, code: Usd.TimeCode) -> Gprim | None:
+        if any(prim.IsA(kind) for kind in _NOT_DRAWN):
+            self._finding(Kind.DROPPED, "gprim-unknown", f"{prim.GetTypeName()} is not drawn", prim)
+            return None
+        shared = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
+        return Gprim(
+            prim=prim,
+            key=str(shared.GetPath()),
+            pieces=self._pieces(prim, code),
+            double_sided=bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get()),
+            shape_varies=time_varying(prim),
+            place_varies=_place_varies(prim),
+        )
+
+    def _pieces(self, prim: Usd.Prim, code: Usd.TimeCode) -> list[Piece]:
+        """The material of each face: subsets of family materialBind, and the rest."""
+        binding = UsdShade.MaterialBindingAPI(prim)
+        subsets = [s for s in binding.GetMaterialBindSubsets()]
+        whole = Piece(None, self._material(prim, binding, code))
+        if not subsets:
+            return [whole]
+        counts = UsdGeom.Mesh(prim).GetFaceVertexCountsAttr().Get(code)
+        rest = np.ones(len(counts or []), np.bool_)
+        pieces = []
+        for subset in subsets:
+            index = np.asarray(subset.GetIndicesAttr().Get(code) or [], np.int64)
+            index = index[(index >= 0) & (index < rest.size)]
+            faces = np.zeros(rest.size, np.bool_)
+            faces[index] = True
+            rest[index] = False
+            own = UsdShade.MaterialBindingAPI(subset.GetPrim())
+            pieces.append(Piece(faces, self._material(subset.GetPrim(), own, code)))
+        if rest.any():
+            pieces.append(Piece(rest, whole.material))
+        return pieces
+
+    def _material(
+        self, prim: Usd.Prim, binding: UsdShade.MaterialBindingAPI, code: Usd.TimeCode
+    ) -> int:
+        bound, _ = binding.ComputeBoundMaterial()
+        material = None
+        key: Sdf.Path | tuple[str, ...]
+        if bound:
+            key = bound.GetPath()
+            if key not in self._material_ids:
+                material = self._material_reader.read(bound, code)
+        else:
+            color = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("displayColor")
+            shown = "displayColor" if color and color.HasValue() else ""
+            key = ("displayColor", shown)
+            white = (1.0, 1.0, 1.0)
+            material = Material(diffuse=white, vertex_color=shown) if shown else Material()
+        if key not in self._material_ids:
+            self._material_ids[key] = len(self.materials)
+            self.materials.append(material or Material())
+        return self._material_ids[key]
+
+    # -- one frame -----------------------------------------------------------------------
+
+    def _light(self, light: Light, cache: UsdGeom.XformCache) -> npt.NDArray[np.void] | None:
+        if not _visible(light.prim, cache.GetTime()):
+            return None
+        if light.row is None or light.varies:
+            world = cache.GetLocalToWorldTransform(light.prim)
+            row = read_light_row(light.prim, cache.GetTime(), world, self.unit, self.report)
+            if row is None or not all(np.isfinite(row[name]).all() for name in row.dtype.names):
+                self._finding(Kind.INVALID, "light-invalid", "not finite; left out", light.prim)
+                return None
+            light.row = row
+        return light.row
+
+    def _ambient(self, code: Usd.TimeCode) -> tuple[float, float, float]:
+        """Lux per channel from everywhere: our AmbientAPI, and domes that it does not stand for."""
+        total = np.zeros(3)
+        spoken_for: set[Sdf.Path] = set()
+        root = self.stage.GetDefaultPrim()
+        if root and root.HasAPI("HdrusdAmbientAPI"):
+            lux = root.GetAttribute("photometric:ambient:illuminance").Get(code)
+            color = root.GetAttribute("photometric:ambient:color").Get(code)
+            if lux is not None:
+                total += lux * np.asarray(color if color is not None else (1, 1, 1))
+                spoken_for.update(root.GetRelationship("photometric:ambient:light").GetTargets())
+        for prim in self._plan.domes if self._plan else []:
+            if prim.GetPath() not in spoken_for and _visible(prim, code):
+                total += read_dome(prim, code, self.report) or (0.0, 0.0, 0.0)
+        r, g, b = (float(v) for v in total)
+        return r, g, b
+
+    def _draws(
+        self, gprim: Gprim, cache: UsdGeom.XformCache, code: Usd.TimeCode
+    ) -> Iterable[Draw]:
+        if not _visible(gprim.prim, code):
+            return
+        if gprim.matrix is None or gprim.place_varies:
+            gprim.matrix = self._to_metres(cache.GetLocalToWorldTransform(gprim.prim))[None]
+        self._read_geometry(gprim, code)
+        for piece in gprim.pieces:
+            if piece.geometry is not None:
+                yield Draw(piece.geometry, piece.material, gprim.matrix, gprim.double_sided)
+
+    def _read_geometry(self, gprim: Gprim, code: Usd.TimeCode) -> None:
+        version = hash(code.GetValue()) if gprim.shape_varies else 0
+        reader: GeometryReader | None = None
+        for index, piece in enumerate(gprim.pieces):
+            if piece.geometry is not None and piece.geometry.version == version:
+                continue
+            material = self.materials[piece.material]
+            key = f"{gprim.key}#{index}:{material.vertex_color}:{','.join(material.uv_sets())}"
+            known = self._geometries.get((key, version))
+            if known is None and (key, version) not in self._geometries:
+                reader = reader or GeometryReader(gprim.prim, code, self.report)
+                known = reader.cut(
+                    key, piece.faces, material.uv_sets(), material.vertex_color, version
+                )
+                if not gprim.shape_varies:
+                    self._geometries[key, version] = known
+            piece.geometry = known
+
+    def _instanced(
+        self, prim: Usd.Prim, cache: UsdGeom.XformCache, code: Usd.TimeCode
+    ) -> Iterable[Draw]:
+        world = cache.GetLocalToWorldTransform(prim)
+        for source, copies in instancer_draws(prim, code, self.purposes, self.report):
+            gprim = self._plan_gprim(source, code)
+            if gprim is None:
+                continue
+            self._read_geometry(gprim, code)
+            matrices = copies @ self._to_metres(world)
+            for piece in gprim.pieces:
+                if piece.geometry is not None:
+                    yield Draw(piece.geometry, piece.material, matrices, gprim.double_sided)
+
+    def _to_metres(self, matrix: Gf.Matrix4d) -> npt.NDArray[np.float64]:
+        result = np.array(matrix, np.float64)
+        result[:, :3] *= self.unit
+        return result
+
+    def _place(self) -> SourceRef:
+        return SourceRef(Path(self.stage.GetRootLayer().identifier))
+
+    def _finding(self, kind: Kind, code: str, text: str, prim: Usd.Prim | None = None) -> None:
+        thing = str(prim.GetPath()) if prim else ""
+        self.report.add(kind, code, self._place(), thing, text)
+
+
+def _merge(draws: list[Draw]) -> Iterable[Draw]:
+    """One draw for all places of a geometry in one material: instances are drawn at once."""
+    groups: dict[tuple[str, int, int, bool], list[Draw]] = {}
+    for draw in draws:
+        key = (draw.geometry.key, draw.geometry.version, draw.material, draw.double_sided)
+        groups.setdefault(key, []).append(draw)
+    for group in groups.values():
+        if len(group) == 1:
+            yield group[0]
+        else:
+            yield replace(group[0], transforms=np.concatenate([d.transforms for d in group]))
+
+
+def _default_light(camera: Camera) -> npt.NDArray[np.void]:
+    row = np.zeros(1, LIGHT)
+    row["position"], row["axis"] = camera.back, -np.asarray(camera.back)
+    row["intensity"] = DEFAULT_SKY
+    row["inner"] = row["outer"] = NO_CONE
+    return row
+
+
+def _visible(prim: Usd.Prim, code: Usd.TimeCode) -> bool:
+    return bool(UsdGeom.Imageable(prim).ComputeVisibility(code) != UsdGeom.Tokens.invisible)
+
+
+def _place_varies(prim: Usd.Prim) -> bool:
+    """Whether any transform from the prim up to the root may change in time."""
+    while prim and not prim.IsPseudoRoot():
+        xformable = UsdGeom.Xformable(prim)
+        if xformable and xformable.TransformMightBeTimeVarying():
+            return True
+        prim = prim.GetParent()
+    return False
+
+
+def _meters_per_unit(stage: Usd.Stage, report: Report) -> float:
+    unit = float(UsdGeom.GetStageMetersPerUnit(stage))
+    place = SourceRef(Path(stage.GetRootLayer().identifier))
+    if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
+        report.add(
+            Kind.ASSUMED, "no-units", place, "", "no metersPerUnit; USD's 0.01 (centimetres) is used"
+        )
+    if not (unit > 0.0 and np.isfinite(unit)):
+        raise InputError(place, f"metersPerUnit {unit}; want a positive number")
+    return unit

@@ -1,0 +1,228 @@
+"""Lights: ``write_light`` from photometry, ``read_light`` back, and ``read_light_row`` for shader 1.
+
+The photometric attributes are the truth; plain UsdLux values that mean the same
+stand beside them for every other renderer: nits, ``normalize`` 0, a real radius
+(docs/decisions/0007).
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from pxr import Gf, Sdf, Usd, UsdLux
+
+from hdrusd.errors import SourceRef
+from hdrusd.photometry.light import PhotometricLight
+from hdrusd.report import Kind, Report
+from hdrusd.scene import LIGHT, NO_CONE
+from hdrusd.units import LUMINANCE_WEIGHTS, distant_luminance, dome_luminance, sphere_luminance
+from hdrusd.usd.lux import LuxReading, read_lux
+
+#: Full angle of a distant light that we write: the sun's and the moon's, degrees.
+DISTANT_ANGLE = 0.53
+
+_API = "HdrusdPhotometricLightAPI"
+_INTENSITY = "inputs:photometric:luminousIntensity"
+_ILLUMINANCE = "inputs:photometric:illuminance"
+
+
+def write_light(
+    stage: Usd.Stage, path: Sdf.Path, light: PhotometricLight, *, scale: float = 1.0
+) -> Usd.Prim:
+    """Define the UsdLux light and its photometry; it shines along its own -Z.
+
+    ``scale``: metres that one unit of the light's own space measures in the world,
+    so that the radius written is the lamp's.
+    """
+    color = Gf.Vec3f(*light.chromaticity)
+    prim: Usd.Prim
+    if light.kind == "distant":
+        distant = UsdLux.DistantLight.Define(stage, path)
+        distant.CreateAngleAttr(DISTANT_ANGLE)
+        distant.CreateIntensityAttr(distant_luminance(light.intensity, DISTANT_ANGLE))
+        prim = distant.GetPrim()
+    elif light.kind == "ambient":
+        dome = UsdLux.DomeLight.Define(stage, path)
+        dome.CreateIntensityAttr(dome_luminance(light.intensity))
+        prim = dome.GetPrim()
+    else:
+        sphere = UsdLux.SphereLight.Define(stage, path)
+        sphere.CreateRadiusAttr(light.radius / scale)
+        sphere.CreateTreatAsPointAttr(True)
+        sphere.CreateIntensityAttr(sphere_luminance(light.intensity, light.radius))
+        prim = sphere.GetPrim()
+        _write_shaping(prim, light)
+    api = UsdLux.LightAPI(prim)
+    api.CreateColorAttr(color)
+    api.CreateNormalizeAttr(False)
+    prim.ApplyAPI(_API)
+    name = _INTENSITY if light.kind in ("point", "spot") else _ILLUMINANCE
+    prim.CreateAttribute(name, Sdf.ValueTypeNames.Float, False).Set(light.intensity)
+    _uniform(prim, "photometric:provenance", Sdf.ValueTypeNames.Token, light.provenance)
+    if light.rule:
+        _uniform(prim, "photometric:rule", Sdf.ValueTypeNames.String, light.rule)
+    if light.source:
+        _uniform(prim, "photometric:source", Sdf.ValueTypeNames.String, light.source)
+    return prim
+
+
+def write_legacy_falloff(
+    prim: Usd.Prim,
+    reach: float | None,
+    attenuation: tuple[float, float, float] | None,
+) -> None:
+    """Keep a legacy range (m) and attenuation as metadata; light has neither."""
+    if reach is not None:
+        _uniform(prim, "photometric:legacy:range", Sdf.ValueTypeNames.Float, reach)
+    if attenuation is not None:
+        value = Gf.Vec3f(*attenuation)
+        _uniform(prim, "photometric:legacy:attenuation", Sdf.ValueTypeNames.Float3, value)
+
+
+def read_light(prim: Usd.Prim, *, scale: float = 1.0) -> PhotometricLight:
+    """Undo ``write_light``: the light as photometry means it."""
+    reading = read_lux(prim, world=_scaled(scale), meters_per_unit=1.0)
+    if reading is None:
+        raise ValueError(f"{prim.GetPath()} is no light")
+    strength, color = _photometric(prim, reading, Usd.TimeCode.Default())
+    shaping = UsdLux.ShapingAPI(prim)
+    has_cone = prim.HasAPI(UsdLux.ShapingAPI)
+    cutoff = float(shaping.GetShapingConeAngleAttr().Get()) if has_cone else 180.0
+    kinds = {"distant": "distant", "dome": "ambient"}
+    kind = kinds.get(reading.kind, "spot" if has_cone else "point")
+
+    def get(name: str) -> str:
+        attribute = prim.GetAttribute(name)
+        return str(attribute.Get() or "") if attribute else ""
+
+    return PhotometricLight(
+        kind=kind,  # type: ignore[arg-type]
+        intensity=strength,
+        chromaticity=(float(color[0]), float(color[1]), float(color[2])),
+        cutoff=cutoff,
+        softness=float(shaping.GetShapingConeSoftnessAttr().Get()) if has_cone else 0.0,
+        exponent=float(shaping.GetShapingFocusAttr().Get()) if has_cone else 0.0,
+        radius=reading.radius or 0.05,
+        provenance=get("photometric:provenance") or "authored",  # type: ignore[arg-type]
+        rule=get("photometric:rule"),
+        source=get("photometric:source"),
+    )
+
+
+def light_time_varying(prim: Usd.Prim) -> bool:
+    """Whether any input of the light may change between frames."""
+    return any(a.ValueMightBeTimeVarying() for a in prim.GetAttributes() if a.HasAuthoredValue())
+
+
+def read_light_row(
+    prim: Usd.Prim,
+    time: Usd.TimeCode,
+    world: Gf.Matrix4d,
+    meters_per_unit: float,
+    report: Report,
+) -> npt.NDArray[np.void] | None:
+    """A (1,) array of ``scene.LIGHT`` in world metres; None for domes and what is no light.
+
+    Disks and rectangles shine as Lambert's cosine from their centre, cylinders and
+    large spheres evenly from theirs: exact far away, and a finding.
+    """
+    reading = read_lux(prim, time, world=world, meters_per_unit=meters_per_unit)
+    if reading is None or reading.kind in ("dome", "other"):
+        return None
+    strength, color = _photometric(prim, reading, time)
+    row = np.zeros(1, LIGHT)
+    rotation = world.ExtractRotationMatrix()
+    axis = -np.array(rotation.GetRow(2), np.float64)
+    axis /= max(float(np.linalg.norm(axis)), 1e-12)
+    row["axis"] = axis
+    row["intensity"] = strength * color
+    row["outer"], row["inner"] = NO_CONE, NO_CONE
+    if reading.kind == "distant":
+        row["position"], row["w"] = -axis, 0.0
+        return row
+    row["position"], row["w"] = np.array(world.ExtractTranslation()) * meters_per_unit, 1.0
+    row["radius"] = reading.radius
+    if reading.kind in ("disk", "rect"):
+        row["outer"] = row["inner"] = math.pi / 2
+        row["exponent"] = 1.0
+    if reading.kind in ("disk", "rect", "cylinder"):
+        _finding(report, prim, "area-light", f"{reading.kind} shines from its centre", Kind.REPLACED)
+    _read_shaping(prim, time, row, report)
+    return row
+
+
+def read_dome(
+    prim: Usd.Prim, time: Usd.TimeCode, report: Report
+) -> tuple[float, float, float] | None:
+    """Illuminance per channel (lx) of a dome light under open sky; None for any other prim."""
+    reading = read_lux(prim, time, world=Gf.Matrix4d(1.0), meters_per_unit=1.0)
+    if reading is None or reading.kind != "dome":
+        return None
+    texture = prim.GetAttribute("inputs:texture:file")
+    if texture and texture.Get() and texture.Get().path:
+        _finding(report, prim, "dome-texture", "dome texture is not read; its colour is uniform")
+    strength, color = _photometric(prim, reading, time)
+    r, g, b = (float(strength * c) for c in color)
+    return r, g, b
+
+
+def _photometric(
+    prim: Usd.Prim, reading: LuxReading, time: Usd.TimeCode
+) -> tuple[float, npt.NDArray[np.float64]]:
+    """Strength (cd or lx) and colour of luminance 1: the photometric value, else the plain one."""
+    rgb = np.asarray(reading.intensity, np.float64)
+    luminance = float(rgb @ LUMINANCE_WEIGHTS)
+    color = rgb / luminance if luminance > 0.0 else np.ones(3)
+    name = _ILLUMINANCE if reading.kind in ("distant", "dome") else _INTENSITY
+    attribute = prim.GetAttribute(name)
+    if attribute and attribute.HasAuthoredValue():
+        return float(attribute.Get(time)), color
+    return luminance, color
+
+
+def _write_shaping(prim: Usd.Prim, light: PhotometricLight) -> None:
+    if light.cutoff >= 180.0 and light.exponent == 0.0:
+        return
+    shaping = UsdLux.ShapingAPI.Apply(prim)
+    shaping.CreateShapingConeAngleAttr(light.cutoff)
+    shaping.CreateShapingConeSoftnessAttr(light.softness)
+    shaping.CreateShapingFocusAttr(light.exponent)
+
+
+def _read_shaping(
+    prim: Usd.Prim, time: Usd.TimeCode, row: npt.NDArray[np.void], report: Report
+) -> None:
+    if not prim.HasAPI(UsdLux.ShapingAPI):
+        return
+    shaping = UsdLux.ShapingAPI(prim)
+    angle = float(shaping.GetShapingConeAngleAttr().Get(time))
+    softness = min(max(float(shaping.GetShapingConeSoftnessAttr().Get(time)), 0.0), 1.0)
+    if 0.0 <= angle < 180.0:
+        outer = math.radians(angle)
+        row["outer"] = np.minimum(row["outer"], outer)
+        row["inner"] = np.minimum(row["inner"], outer * (1.0 - softness))
+    row["exponent"] += max(float(shaping.GetShapingFocusAttr().Get(time)), 0.0)
+    profile = shaping.GetShapingIesFileAttr().Get(time)
+    if profile and profile.path:
+        _finding(report, prim, "ies-profile", f"{profile.path}: profile is not read")
+    tint = shaping.GetShapingFocusTintAttr().Get(time)
+    if tint is not None and any(tint):
+        _finding(report, prim, "focus-tint", "focus tint is not shown")
+
+
+def _scaled(scale: float) -> Gf.Matrix4d:
+    return Gf.Matrix4d().SetScale(scale)
+
+
+def _uniform(prim: Usd.Prim, name: str, kind: Sdf.ValueTypeName, value: object) -> None:
+    prim.CreateAttribute(name, kind, False, Sdf.VariabilityUniform).Set(value)
+
+
+def _finding(
+    report: Report, prim: Usd.Prim, code: str, text: str, kind: Kind = Kind.DROPPED
+) -> None:
+    place = SourceRef(Path(prim.GetStage().GetRootLayer().identifier))
+    report.add(kind, code, place, str(prim.GetPath()), text)

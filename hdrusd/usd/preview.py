@@ -1,0 +1,273 @@
+"""``read_material``: a UsdPreviewSurface network, and our schema over it, as shader 1 wants it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pxr import Gf, Usd, UsdShade
+
+from hdrusd.errors import SourceRef
+from hdrusd.report import Kind, Report
+from hdrusd.scene import Material, TextureRef, TextureUse
+from hdrusd.usd.assets import resolved_asset
+
+#: Exponent range that a roughness maps to; at 1e5 the lobe is half a degree wide.
+_MAX_SHININESS = 1e5
+
+#: Inputs of UsdPreviewSurface that shader 1 has no term for yet, with the value that means "off".
+_UNUSED = {"clearcoat": 0.0, "displacement": 0.0, "occlusion": 1.0}
+
+_CHANNELS = {"rgb": -1, "r": 0, "g": 1, "b": 2, "a": 3, "rgba": -1}
+
+
+def shininess_from_roughness(roughness: float) -> float:
+    """Blinn-Phong exponent of a preview surface roughness: alpha = roughness^2, n = 2/alpha^2 - 2."""
+    alpha = max(roughness, 1e-3) ** 2
+    return min(max(2.0 / (alpha * alpha) - 2.0, 0.0), _MAX_SHININESS)
+
+
+def roughness_from_shininess(shininess: float) -> float:
+    """The inverse, for the plain values that other renderers read."""
+    return float((2.0 / (max(shininess, 0.0) + 2.0)) ** 0.25)
+
+
+class MaterialReader:
+    """Reads the materials of one stage; each lack is a finding, once a material."""
+
+    def __init__(self, stage: Usd.Stage, report: Report) -> None:
+        self.report = report
+        self.place = SourceRef(Path(stage.GetRootLayer().identifier))
+
+    def read(self, material: UsdShade.Material, time: Usd.TimeCode) -> Material | None:
+        """The material at ``time``, or None when it has no surface that we know."""
+        prim = material.GetPrim()
+        shader, _, _ = material.ComputeSurfaceSource()
+        if not shader or shader.GetIdAttr().Get() != "UsdPreviewSurface":
+            what = shader.GetIdAttr().Get() if shader else "no surface"
+            self._finding(prim, "material-unknown", f"{what}; want UsdPreviewSurface; grey is used")
+            return None
+        surface = _Surface(shader, time)
+        self._note_unused(prim, surface)
+        diffuse, diffuse_map, primvar = self._color(prim, surface, "diffuseColor", (0.18,) * 3)
+        emission, emission_map, _ = self._color(prim, surface, "emissiveColor", (0.0,) * 3)
+        opacity_map = self._texture(prim, surface, "opacity")
+        opacity = float(surface.value("opacity", 1.0))
+        threshold = float(surface.value("opacityThreshold", 0.0))
+        if threshold <= 0.0 and (opacity < 1.0 or opacity_map is not None):
+            threshold = 0.5
+            self._finding(
+                prim, "alpha-blend", "blending is drawn as a cut-out at opacity 0.5", Kind.REPLACED
+            )
+        specular, metallic = self._specular(prim, surface)
+        roughness = self._factor(prim, surface, "roughness", 0.5)
+        shininess = shininess_from_roughness(roughness)
+        ours = _Photometric(prim, time)
+        if ours.shininess is not None:
+            shininess = ours.shininess
+        if ours.specular is not None:
+            specular, metallic = ours.specular, 0.0
+        return Material(
+            diffuse=diffuse,
+            diffuse_map=diffuse_map,
+            vertex_color=ours.vertex_color or primvar,
+            specular=specular,
+            shininess=shininess,
+            metallic=metallic,
+            emission=emission,
+            emission_map=emission_map,
+            opacity=opacity,
+            opacity_map=opacity_map,
+            opacity_threshold=threshold,
+        )
+
+    def _specular(
+        self, prim: Usd.Prim, surface: _Surface
+    ) -> tuple[tuple[float, float, float], float]:
+        if int(surface.value("useSpecularWorkflow", 0)) == 1:
+            color, used, _ = self._color(prim, surface, "specularColor", (0.0,) * 3)
+            if used is not None:
+                self._finding(prim, "specular-texture", "specularColor texture is not used")
+            return color, 0.0
+        ior = float(surface.value("ior", 1.5))
+        f0 = ((1.0 - ior) / (1.0 + ior)) ** 2
+        return (f0, f0, f0), self._factor(prim, surface, "metallic", 0.0)
+
+    def _factor(self, prim: Usd.Prim, surface: _Surface, name: str, default: float) -> float:
+        """A float input; a texture on it has no term yet and the input's own value holds."""
+        if self._texture(prim, surface, name) is not None:
+            self._finding(prim, f"{name}-texture", f"{name} texture is not used; {default} is")
+            return default
+        return float(np.clip(surface.value(name, default), 0.0, 1.0))
+
+    def _note_unused(self, prim: Usd.Prim, surface: _Surface) -> None:
+        for name, off in _UNUSED.items():
+            if surface.connected(name) or abs(float(surface.value(name, off)) - off) > 1e-6:
+                self._finding(prim, f"{name}-unused", f"{name} is not shown")
+        if surface.connected("normal"):
+            self._finding(prim, "normal-map-unused", "normal map is not shown")
+
+    def _color(
+        self, prim: Usd.Prim, surface: _Surface, name: str, default: tuple[float, ...]
+    ) -> tuple[tuple[float, float, float], TextureUse | None, str]:
+        """A colour input as (constant, texture, primvar that gives it)."""
+        source = surface.source(name)
+        if source is not None and str(source.GetIdAttr().Get()).startswith("UsdPrimvarReader_"):
+            varname = source.GetInput("varname")
+            primvar = str(varname.Get() or "") if varname else ""
+            return (1.0, 1.0, 1.0), None, primvar
+        value = surface.value(name, default)
+        r, g, b = (float(v) for v in value)
+        if not all(math.isfinite(v) and v >= 0.0 for v in (r, g, b)):
+            self._finding(prim, "color-invalid", f"{name} {tuple(value)}; want finite values >= 0")
+            r, g, b = (max(v, 0.0) if math.isfinite(v) else 0.0 for v in (r, g, b))
+        return (r, g, b), self._texture(prim, surface, name), ""
+
+    def _texture(self, prim: Usd.Prim, surface: _Surface, name: str) -> TextureUse | None:
+        source = surface.source(name)
+        if source is None:
+            return None
+        kind = source.GetIdAttr().Get()
+        if kind != "UsdUVTexture":
+            self._finding(
+                prim, "node-unknown", f"{name}: {kind or 'a node without id'} is not read"
+            )
+            return None
+        texture = _Node(source, surface.time)
+        asset = texture.value("file", None)
+        if asset is None or not asset.path:
+            self._finding(prim, "texture-missing", f"{name}: texture names no file", Kind.MISSING)
+        attribute = texture.producer("file")
+        file = resolved_asset(attribute, asset) if asset and attribute else ""
+        space = str(texture.value("sourceColorSpace", "auto"))
+        decode = {"raw": "linear", "sRGB": "gamma"}.get(space, "auto")
+        uv_set, matrix = self._coordinates(prim, texture)
+        return TextureUse(
+            texture=TextureRef(
+                file=file,
+                decode=decode,  # type: ignore[arg-type]
+                wrap_s=_wrap(texture.value("wrapS", "useMetadata")),
+                wrap_t=_wrap(texture.value("wrapT", "useMetadata")),
+            ),
+            uv_set=uv_set,
+            matrix=matrix,
+            scale=_four(texture.value("scale", (1, 1, 1, 1))),
+            bias=_four(texture.value("bias", (0, 0, 0, 0))),
+            channel=_CHANNELS.get(surface.output(name), -1),
+            fallback=_four(texture.value("fallback", (0, 0, 0, 1))),
+        )
+
+    def _coordinates(self, prim: Usd.Prim, texture: _Node) -> tuple[str, tuple[float, ...]]:
+        """The primvar and the 2 x 3 matrix that lead to the texture's coordinates."""
+        node = texture.source("st")
+        matrix = np.eye(3)
+        for _ in range(8):  # a chain of transforms; more than a few is a loop
+            if node is None:
+                break
+            kind = node.GetIdAttr().Get()
+            inner = _Node(node, texture.time)
+            if kind == "UsdPrimvarReader_float2":
+                name = inner.value("varname", "st")
+                return str(name or "st"), tuple(float(v) for v in matrix[:2].ravel())
+            if kind != "UsdTransform2d":
+                self._finding(prim, "node-unknown", f"st: {kind} is not read; st is used")
+                break
+            matrix = matrix @ transform_2d(
+                inner.value("scale", (1, 1)),
+                float(inner.value("rotation", 0.0)),
+                inner.value("translation", (0, 0)),
+            )
+            node = inner.source("in")
+        return "st", tuple(float(v) for v in matrix[:2].ravel())
+
+    def _finding(
+        self, prim: Usd.Prim, code: str, text: str, kind: Kind = Kind.DROPPED
+    ) -> None:
+        self.report.add(kind, code, self.place, str(prim.GetPath()), text)
+
+
+def transform_2d(scale: Any, rotation: float, translation: Any) -> np.ndarray:  # type: ignore[type-arg]
+    """(3, 3) column-vector matrix of UsdTransform2d: scale, then rotate (degrees, ccw), then move."""
+    c, s = math.cos(math.radians(rotation)), math.sin(math.radians(rotation))
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    matrix = turn @ np.diag([float(scale[0]), float(scale[1]), 1.0])
+    matrix[:2, 2] = float(translation[0]), float(translation[1])
+    return np.asarray(matrix)
+
+
+class _Node:
+    """A shader node at a time: values and sources through interfaces and node graphs."""
+
+    def __init__(self, shader: UsdShade.Shader, time: Usd.TimeCode) -> None:
+        self.shader = shader
+        self.time = time
+
+    def producer(self, name: str) -> Usd.Attribute | None:
+        """The attribute whose value reaches input ``name``."""
+        port = self.shader.GetInput(name)
+        if not port:
+            return None
+        attributes = UsdShade.Utils.GetValueProducingAttributes(port)
+        return attributes[0] if attributes else None
+
+    def value(self, name: str, default: Any) -> Any:
+        attribute = self.producer(name)
+        if attribute is None or UsdShade.Utils.GetType(attribute.GetName()) == _OUTPUT:
+            port = self.shader.GetInput(name)  # connected to a node: its own value, if any
+            value = port.GetAttr().Get(self.time) if port else None
+        else:
+            value = attribute.Get(self.time)
+        return default if value is None else value
+
+    def source(self, name: str) -> UsdShade.Shader | None:
+        """The node that feeds input ``name``, or None for a constant."""
+        attribute = self.producer(name)
+        if attribute is None or UsdShade.Utils.GetType(attribute.GetName()) != _OUTPUT:
+            return None
+        shader = UsdShade.Shader(attribute.GetPrim())
+        return shader if shader else None
+
+    def output(self, name: str) -> str:
+        """Which output of that node: "rgb", "a"."""
+        attribute = self.producer(name)
+        return attribute.GetBaseName() if attribute is not None else ""
+
+    def connected(self, name: str) -> bool:
+        return self.source(name) is not None
+
+
+class _Surface(_Node):
+    """The UsdPreviewSurface node."""
+
+
+_OUTPUT = UsdShade.AttributeType.Output
+
+
+class _Photometric:
+    """What HdrusdPhotometricMaterialAPI says, None where it is silent."""
+
+    def __init__(self, prim: Usd.Prim, time: Usd.TimeCode) -> None:
+        def get(name: str) -> Any:
+            attribute = prim.GetAttribute(name)
+            return attribute.Get(time) if attribute and attribute.HasAuthoredValue() else None
+
+        specular = get("legacy:specularColor")
+        shininess = get("legacy:shininess")
+        self.specular = None if specular is None else tuple(float(v) for v in specular)
+        self.shininess = None if shininess is None else float(shininess)
+        self.vertex_color = str(get("photometric:vertexColor") or "")
+
+
+def _wrap(mode: Any) -> str:
+    """UsdUVTexture's wrap; useMetadata without metadata is black, as its text says."""
+    mode = str(mode)
+    return mode if mode in ("repeat", "clamp", "mirror") else "black"
+
+
+def _four(values: Any) -> tuple[float, float, float, float]:
+    a, b, c, d = (float(v) for v in (Gf.Vec4f(*values)))
+    return a, b, c, d
+
+

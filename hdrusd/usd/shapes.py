@@ -1,0 +1,122 @@
+"""UsdGeom's implicit shapes as polygons: Cube, Sphere, Cylinder, Cone, Capsule, Plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from pxr import Usd, UsdGeom
+
+#: Sides of a round shape: at 48 the silhouette is within 0.2 % of the radius.
+SIDES = 48
+
+_AXES = {"X": [2, 0, 1], "Y": [1, 2, 0], "Z": [0, 1, 2]}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shape:
+    """Polygons of a shape; ``normals`` one for each point, or None for flat faces."""
+
+    points: npt.NDArray[np.float32]
+    counts: npt.NDArray[np.int64]
+    indices: npt.NDArray[np.int64]
+    normals: npt.NDArray[np.float32] | None
+
+
+def read_shape(prim: Usd.Prim, time: Usd.TimeCode) -> Shape | None:
+    """Polygons of an implicit shape at a time; None for any other prim."""
+    if prim.IsA(UsdGeom.Cube):
+        return _cube(float(UsdGeom.Cube(prim).GetSizeAttr().Get(time)))
+    if prim.IsA(UsdGeom.Plane):
+        plane = UsdGeom.Plane(prim)
+        width, length = plane.GetWidthAttr().Get(time), plane.GetLengthAttr().Get(time)
+        return _plane(float(width), float(length), plane.GetAxisAttr().Get(time))
+    if prim.IsA(UsdGeom.Sphere):
+        radius = float(UsdGeom.Sphere(prim).GetRadiusAttr().Get(time))
+        angle = np.linspace(-np.pi / 2, np.pi / 2, SIDES // 2 + 1)
+        return _revolve(np.cos(angle), np.sin(angle), np.cos(angle), np.sin(angle), radius, "Z")
+    for kind in (UsdGeom.Cylinder, UsdGeom.Cone, UsdGeom.Capsule):
+        if prim.IsA(kind):
+            shape = kind(prim)
+            radius = float(shape.GetRadiusAttr().Get(time))
+            height = float(shape.GetHeightAttr().Get(time))
+            return _round(kind, radius, height, shape.GetAxisAttr().Get(time))
+    return None
+
+
+def _round(kind: Any, radius: float, height: float, axis: str) -> Shape:
+    """A profile (radius, height, normal's two parts) revolved about the axis."""
+    h = height / 2
+    if kind is UsdGeom.Cylinder:
+        r, z = [0, radius, radius, radius, radius, 0], [-h, -h, -h, h, h, h]
+        nr, nz = [0, 0, 1, 1, 0, 0], [-1, -1, 0, 0, 1, 1]
+    elif kind is UsdGeom.Cone:
+        slope = float(np.hypot(height, radius)) or 1.0
+        r, z = [0, radius, radius, 0], [-h, -h, -h, h]
+        nr, nz = [0, 0, height / slope, height / slope], [-1, -1, radius / slope, radius / slope]
+    else:
+        angle = np.linspace(-np.pi / 2, np.pi / 2, SIDES // 2 + 2)
+        nr, nz = list(np.cos(angle)), list(np.sin(angle))
+        r = [radius * c for c in nr]
+        z = [radius * s + (h if s > 0 else -h) for s in nz]
+    return _revolve(np.array(r, float), np.array(z, float), np.array(nr), np.array(nz), 1.0, axis)
+
+
+def _revolve(
+    r: npt.NDArray[Any],
+    z: npt.NDArray[Any],
+    nr: npt.NDArray[Any],
+    nz: npt.NDArray[Any],
+    scale: float,
+    axis: str,
+) -> Shape:
+    turn = np.linspace(0.0, 2 * np.pi, SIDES, endpoint=False)
+    cos, sin = np.cos(turn)[None, :], np.sin(turn)[None, :]
+
+    def ring(radial: npt.NDArray[Any], axial: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        flat = np.stack(
+            np.broadcast_arrays(radial[:, None] * cos, radial[:, None] * sin, axial[:, None]), -1
+        )
+        return flat.reshape(-1, 3)[:, _AXES[axis]]
+
+    rows, columns = np.mgrid[0 : len(r) - 1, 0:SIDES]
+    after = (columns + 1) % SIDES
+    quads = np.stack(
+        [
+            rows * SIDES + columns,
+            rows * SIDES + after,
+            (rows + 1) * SIDES + after,
+            (rows + 1) * SIDES + columns,
+        ],
+        -1,
+    ).reshape(-1, 4)
+    return Shape(
+        (ring(r, z) * scale).astype(np.float32),
+        np.full(len(quads), 4, np.int64),
+        quads.ravel(),
+        ring(nr, nz).astype(np.float32),
+    )
+
+
+def _cube(size: float) -> Shape:
+    points = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float32)
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    return Shape(
+        np.asarray(points * size / 2, np.float32),
+        np.full(6, 4, np.int64),
+        np.array(quads, np.int64).ravel(),
+        None,
+    )
+
+
+def _plane(width: float, length: float, axis: str) -> Shape:
+    corner = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32)
+    corner *= np.array([width / 2, length / 2, 0], np.float32)
+    return Shape(
+        np.asarray(corner[:, _AXES[axis]], np.float32),
+        np.array([4], np.int64),
+        np.arange(4),
+        None,
+    )

@@ -1,0 +1,431 @@
+"""USD validators for photometry, and ``validate``, which runs them with USD's own.
+
+USD knows the validators from ``schemas/validation/plugInfo.json`` and imports this
+module when one of them is first asked for; in usdview and ``usdchecker`` too, with
+the plug-in on ``PXR_PLUGINPATH_NAME``. An exception that leaves a check ends the whole
+validation in OpenUSD 26.11, so none does: a check that breaks down says so as an error.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import wraps
+from typing import Any, Literal
+
+import numpy as np
+from pxr import Gf, Usd, UsdGeom, UsdShade, UsdValidation
+
+from hdrusd.errors import SchemaRegistrationError
+from hdrusd.schemas import register
+from hdrusd.units import LUMINANCE_WEIGHTS
+from hdrusd.usd.lux import connection_end, input_source, is_light, light_kind, read_lux
+
+register()
+
+#: How far two statements of one quantity may differ, relative to the larger.
+AGREEMENT = 1e-3
+
+#: USD's own validators that ``validate`` runs: whether the stage composes, says what
+#: it is and refers to what exists, and whether lights and materials stand where they may.
+#: Units and up axis are with StageUnits; checks of every mesh are left out for their cost.
+BUILT_IN = (
+    "usdValidation:CompositionErrorTest",
+    "usdValidation:StageMetadataChecker",
+    "usdLuxValidators:EncapsulationRulesValidator",
+    "usdShadeValidators:EncapsulationMaterialValidator",
+    "usdShadeValidators:MaterialBindingApiAppliedValidator",
+    "usdShadeValidators:MaterialBindingRelationships",
+    "usdUtilsValidators:MissingReferenceValidator",
+)
+OURS = tuple(
+    f"hdrusd.validation:{name}"
+    for name in ("StageUnits", "LightIntensity", "MaterialReflectance", "AmbientLight")
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One thing that a validator found."""
+
+    severity: Literal["error", "warning"]
+    validator: str  # "LightIntensity"; USD's own with their plug-in: "usdLuxValidators:..."
+    path: str  # of the prim or property, "/" for the stage
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.text}"
+
+
+def validate(stage: Usd.Stage) -> list[Problem]:
+    """What the validators of keyword "hdrusd" and ``BUILT_IN`` say of a stage, errors first.
+
+    SchemaRegistrationError when USD made its list of validators before the plug-in was
+    registered.
+    """
+    registry = UsdValidation.ValidationRegistry()
+    missing = [name for name in OURS if not registry.HasValidator(name)]
+    if missing:
+        raise SchemaRegistrationError(
+            f"USD validators: {', '.join(missing)}: unknown, because USD was asked for validators "
+            "before hdrusd registered its own; import hdrusd.usd first"
+        )
+    # By keyword, so that validators that other packages file under ours run as well.
+    ours = [found.name for found in registry.GetValidatorMetadataForKeyword("hdrusd")]
+    validators = registry.GetOrLoadValidatorsByName([*ours, *BUILT_IN])
+    errors = UsdValidation.ValidationContext(validators).Validate(stage)
+    problems = {_problem(error) for error in errors}
+    return sorted(problems, key=lambda p: (p.severity, p.path, p.validator, p.text))
+
+
+def _problem(error: UsdValidation.ValidationError) -> Problem:
+    grave = error.GetType() == UsdValidation.ValidationErrorType.Error
+    name = error.GetValidator().GetMetadata().name
+    path = next((_site_path(site) for site in error.GetSites()), "/")
+    text = error.GetMessage().strip()
+    return Problem(
+        "error" if grave else "warning", name.removeprefix("hdrusd.validation:"), path, text
+    )
+
+
+def _site_path(site: UsdValidation.ValidationErrorSite) -> str:
+    if site.IsProperty():
+        return str(site.GetProperty().GetPath())
+    return str(site.GetPrim().GetPath()) if site.IsPrim() else "/"
+
+
+@dataclass(frozen=True, slots=True)
+class _Fault:
+    """What a check yields; ``name`` is USD's name of the error."""
+
+    name: str
+    text: str
+    warning: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Range:
+    """What numbers are allowed, ends included."""
+
+    least: float
+    most: float
+    want: str
+
+
+_FINITE = _Range(-math.inf, math.inf, "a finite number")
+_NOT_NEGATIVE = _Range(0.0, math.inf, "0 or more")
+_POSITIVE = _Range(math.ulp(0.0), math.inf, "above 0")
+#: A reflectance of 1 may have been through float32 a few times.
+_REFLECTANCE = _Range(0.0, 1.0 + 1e-6, "0 to 1")
+
+
+_Check = Callable[[Any, UsdValidation.ValidationTimeRange], Iterator[_Fault]]
+
+
+def _task(check: _Check) -> Callable[..., list[UsdValidation.ValidationError]]:
+    """The function that USD calls, from a generator of faults of a prim or a stage."""
+
+    @wraps(check)
+    def run(
+        subject: Any, span: UsdValidation.ValidationTimeRange
+    ) -> list[UsdValidation.ValidationError]:
+        faults: list[_Fault] = []
+        try:
+            faults.extend(check(subject, span))
+        except Exception as problem:  # see the module's text
+            faults.append(_Fault("CheckFailed", f"the check broke down: {problem!r}"))
+        prim = subject.GetPseudoRoot() if isinstance(subject, Usd.Stage) else subject
+        site = UsdValidation.ValidationErrorSite(prim.GetStage(), prim.GetPath())
+        kind = UsdValidation.ValidationErrorType
+        return [
+            UsdValidation.ValidationError(
+                fault.name, kind.Warn if fault.warning else kind.Error, [site], fault.text
+            )
+            for fault in faults
+        ]
+
+    return run
+
+
+@_task
+def check_stage_units(stage: Usd.Stage, span: Any) -> Iterator[_Fault]:
+    """The metersPerUnit of the stage is authored, finite and above 0; the upAxis is authored."""
+    if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
+        yield _Fault("MissingMetersPerUnit", "no metersPerUnit; want it authored, best 1")
+    else:
+        unit = UsdGeom.GetStageMetersPerUnit(stage)
+        if not (math.isfinite(unit) and unit > 0.0):
+            yield _Fault("BadMetersPerUnit", f"metersPerUnit {unit:g}; want finite and above 0")
+    if not stage.HasAuthoredMetadata(UsdGeom.Tokens.upAxis):
+        yield _Fault("MissingUpAxis", 'no upAxis; want "Y" or "Z"')
+
+
+_LIGHT_NUMBERS = {
+    "intensity": _NOT_NEGATIVE,
+    "exposure": _FINITE,
+    "color": _NOT_NEGATIVE,
+    "colorTemperature": _NOT_NEGATIVE,
+    "radius": _NOT_NEGATIVE,
+    "width": _NOT_NEGATIVE,
+    "height": _NOT_NEGATIVE,
+    "length": _NOT_NEGATIVE,
+    "angle": _NOT_NEGATIVE,
+    "photometric:luminousIntensity": _NOT_NEGATIVE,
+    "photometric:illuminance": _NOT_NEGATIVE,
+}
+_AREA_KINDS = frozenset({"sphere", "disk", "rect", "cylinder"})
+
+
+@_task
+def check_light(prim: Usd.Prim, span: UsdValidation.ValidationTimeRange) -> Iterator[_Fault]:
+    """A light's numbers are sound, and say the same in UsdLux and in photometric units."""
+    sources = {name: input_source(prim, name) for name in _LIGHT_NUMBERS}
+    broken = [
+        fault
+        for name, allowed in _LIGHT_NUMBERS.items()
+        for fault in _bad_numbers(sources[name], f"inputs:{name}", span, allowed)
+    ]
+    yield from broken
+    kind = light_kind(prim)
+    if kind in _AREA_KINDS:
+        yield from _ambiguous_size(prim, kind)
+    wrong = "illuminance" if kind in _AREA_KINDS else "luminousIntensity"
+    if kind != "other" and _authored(prim, f"inputs:photometric:{wrong}"):
+        right = "luminousIntensity (cd)" if kind in _AREA_KINDS else "illuminance (lx)"
+        yield _Fault(
+            "WrongQuantity",
+            f"inputs:photometric:{wrong} has no meaning on a {kind} light; want {right}",
+        )
+    if not broken and kind != "other" and not _has_photometric_file(prim):
+        yield from _disagreement(prim, kind in _AREA_KINDS, _times(sources.values(), span))
+
+
+def _ambiguous_size(prim: Usd.Prim, kind: str) -> Iterator[_Fault]:
+    """Where renderers may read the size of a light in different ways."""
+    unit = UsdGeom.GetStageMetersPerUnit(prim.GetStage())
+    normalize = input_source(prim, "normalize").Get(Usd.TimeCode.EarliestTime())
+    if normalize is True and unit != 1.0:
+        yield _Fault(
+            "NormalizedArea",
+            f"inputs:normalize = 1 with metersPerUnit {unit:g}: renderers differ on whether the "
+            "area counts in scene units or in m2; want normalize = 0 or metersPerUnit 1",
+            warning=True,
+        )
+    if kind not in {"sphere", "cylinder"}:
+        return
+    world = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(Usd.TimeCode.EarliestTime())
+    linear = np.array(world, np.float64)[:3, :3]
+    scales = np.linalg.svd(linear, compute_uv=False) if np.isfinite(linear).all() else np.ones(3)
+    if scales[0] - scales[-1] > AGREEMENT * scales[0]:
+        yield _Fault(
+            "NonUniformScale",
+            f"a {kind} light under a non-uniform scale has no single radius; want one scale",
+            warning=True,
+        )
+
+
+def _disagreement(prim: Usd.Prim, placed: bool, times: list[Usd.TimeCode]) -> Iterator[_Fault]:
+    """The plain UsdLux reading against the photometric value, once, at the first such time."""
+    name, unit = ("luminousIntensity", "cd") if placed else ("illuminance", "lx")
+    if not _authored(prim, f"inputs:photometric:{name}"):
+        return
+    source = input_source(prim, f"photometric:{name}")
+    for time in times:
+        said, reading = source.Get(time), read_lux(prim, time)
+        if said is None or reading is None:
+            continue
+        plain = _luminance(reading.intensity)
+        if not math.isclose(plain, said, rel_tol=AGREEMENT):
+            yield _Fault(
+                "Disagreement",
+                f"inputs:photometric:{name} {said:.6g} {unit}, but the UsdLux inputs say "
+                f"{plain:.6g} {unit}{_when(time)}; want both within 0.1 %",
+            )
+            return
+
+
+def _has_photometric_file(prim: Usd.Prim) -> bool:
+    """Whether the candela are a file's, which the UsdLux inputs only multiply."""
+    names = ("inputs:photometric:file", "inputs:shaping:ies:file")
+    paths = (prim.GetAttribute(name).Get() for name in names if _authored(prim, name))
+    return any(getattr(path, "path", "") for path in paths)
+
+
+_MATERIAL_NUMBERS = {
+    "photometric:diffuse": _REFLECTANCE,
+    "photometric:gamma": _POSITIVE,
+    "legacy:shininess": _NOT_NEGATIVE,
+}
+
+
+@_task
+def check_material(prim: Usd.Prim, span: UsdValidation.ValidationTimeRange) -> Iterator[_Fault]:
+    """Reflectances are physical, and emission says the same in both places."""
+    for name, allowed in _MATERIAL_NUMBERS.items():
+        yield from _bad_numbers(prim.GetAttribute(name), name, span, allowed)
+    luminance = prim.GetAttribute("photometric:luminance")
+    faults = list(_bad_numbers(luminance, "photometric:luminance", span, _NOT_NEGATIVE))
+    surface = _preview_surface(prim)
+    if surface is not None:
+        for name in ("diffuseColor", "specularColor"):
+            source = input_source(surface, name)
+            yield from _bad_numbers(source, f"inputs:{name}", span, _REFLECTANCE)
+        emissive = input_source(surface, "emissiveColor")
+        faults += _bad_numbers(emissive, "inputs:emissiveColor", span, _NOT_NEGATIVE)
+        if not faults and luminance and luminance.HasAuthoredValue():
+            yield from _emission_disagreement(surface, luminance, span)
+    yield from faults
+
+
+def _preview_surface(prim: Usd.Prim) -> Usd.Prim | None:
+    output = UsdShade.Material(prim).GetSurfaceOutput()
+    if not output:
+        return None
+    shader = UsdShade.Shader(connection_end(output.GetAttr()).GetPrim())
+    if not shader or shader.GetIdAttr().Get() != "UsdPreviewSurface":
+        return None
+    return shader.GetPrim()
+
+
+def _emission_disagreement(
+    surface: Usd.Prim, luminance: Usd.Attribute, span: UsdValidation.ValidationTimeRange
+) -> Iterator[_Fault]:
+    own = surface.GetAttribute("inputs:emissiveColor")
+    if own and UsdShade.Output.IsOutput(connection_end(own)):
+        return  # a texture: its pixels are not read here
+    emissive = input_source(surface, "emissiveColor")
+    for time in _times([emissive, luminance], span):
+        said = luminance.Get(time)
+        color = emissive.Get(time) if emissive else (0.0, 0.0, 0.0)  # UsdPreviewSurface's default
+        if said is None or color is None:
+            continue
+        plain = _luminance(color)
+        if not math.isclose(plain, said, rel_tol=AGREEMENT):
+            yield _Fault(
+                "Disagreement",
+                f"photometric:luminance {said:.6g} cd/m2, but emissiveColor has {plain:.6g} cd/m2"
+                f"{_when(time)}; want both within 0.1 %",
+            )
+            return
+
+
+@_task
+def check_ambient(prim: Usd.Prim, span: UsdValidation.ValidationTimeRange) -> Iterator[_Fault]:
+    """The ambient term is sound, and its dome light says the same."""
+    lux = prim.GetAttribute("photometric:ambient:illuminance")
+    tint = prim.GetAttribute("photometric:ambient:color")
+    faults = [
+        fault
+        for source in (lux, tint)
+        for fault in _bad_numbers(source, source.GetName(), span, _NOT_NEGATIVE)
+    ]
+    yield from faults
+    targets = prim.GetRelationship("photometric:ambient:light").GetTargets()
+    if faults or not targets:
+        return
+    dome = prim.GetStage().GetPrimAtPath(targets[0])
+    if len(targets) > 1 or not is_light(dome) or light_kind(dome) != "dome":
+        found = ", ".join(str(path) for path in targets)
+        yield _Fault("NoDome", f"photometric:ambient:light is {found}; want one dome light")
+        return
+    if _authored(dome, "inputs:texture:file"):
+        yield _Fault(
+            "TexturedDome",
+            f"{dome.GetPath()} has a texture, which ambient light has not; want a plain dome",
+            warning=True,
+        )
+        return
+    names = ("intensity", "exposure", "color", "enableColorTemperature", "colorTemperature")
+    for time in _times([lux, tint, *(input_source(dome, name) for name in names)], span):
+        fault = _ambient_disagreement(lux.Get(time), tint.Get(time), dome, time)
+        if fault is not None:
+            yield fault
+            return
+
+
+def _ambient_disagreement(
+    lux: float | None, tint: Gf.Vec3f | None, dome: Usd.Prim, time: Usd.TimeCode
+) -> _Fault | None:
+    """Channel by channel, relative to the illuminance."""
+    color = (1.0, 1.0, 1.0) if tint is None else tuple(tint)
+    if not math.isclose(_luminance(color), 1.0, rel_tol=AGREEMENT):
+        text = f"photometric:ambient:color has a luminance of {_luminance(color):.6g}; want 1"
+        return _Fault("ColorLuminance", text)
+    reading = read_lux(dome, time)
+    if reading is None:
+        return None
+    said = np.multiply(lux or 0.0, color)
+    difference = np.abs(said - reading.intensity).max()
+    if difference <= AGREEMENT * max(_luminance(said), _luminance(reading.intensity)):
+        return None
+    return _Fault(
+        "Disagreement",
+        f"ambient light of {_channels(said)} lx, but {dome.GetPath()} gives "
+        f"{_channels(reading.intensity)} lx{_when(time)}; want both within 0.1 %",
+    )
+
+
+def _bad_numbers(
+    source: Usd.Attribute, name: str, span: UsdValidation.ValidationTimeRange, allowed: _Range
+) -> Iterator[_Fault]:
+    """The first value of an attribute, if any, that is not finite and within ``allowed``."""
+    if not source or not source.HasAuthoredValue():
+        return
+    for time in [Usd.TimeCode.Default(), *_samples([source], span)]:
+        value = source.Get(time)
+        if value is None:
+            continue
+        if not isinstance(value, (int, float, Gf.Vec3f, Gf.Vec3d, Gf.Vec3h)):
+            yield _Fault("NoNumber", f"{name} {value!r}; want {allowed.want}")
+            return
+        numbers = np.asarray(value, np.float64)
+        finite = bool(np.isfinite(numbers).all())
+        if not finite or numbers.min() < allowed.least or numbers.max() > allowed.most:
+            problem = f"{name} {_channels(numbers)}{_when(time)}; want {allowed.want}"
+            yield _Fault("OutOfRange" if finite else "NotFinite", problem)
+            return
+
+
+def _samples(
+    sources: Iterable[Usd.Attribute], span: UsdValidation.ValidationTimeRange
+) -> list[Usd.TimeCode]:
+    """The times in the span at which any of the attributes has a sample."""
+    interval = span.GetInterval()
+    found = (a.GetTimeSamplesInInterval(interval) for a in sources if a)
+    return [Usd.TimeCode(time) for time in sorted({time for times in found for time in times})]
+
+
+def _times(
+    sources: Iterable[Usd.Attribute], span: UsdValidation.ValidationTimeRange
+) -> list[Usd.TimeCode]:
+    """Where to compare: at every sample in the span, or once where nothing varies."""
+    return _samples(sources, span) or [Usd.TimeCode.EarliestTime()]
+
+
+def _authored(prim: Usd.Prim, name: str) -> bool:
+    attribute = prim.GetAttribute(name)
+    return bool(attribute) and bool(connection_end(attribute).HasAuthoredValue())
+
+
+def _luminance(color: Iterable[float]) -> float:
+    return sum(weight * c for weight, c in zip(LUMINANCE_WEIGHTS, color, strict=True))
+
+
+def _channels(numbers: Any) -> str:
+    return ", ".join(f"{number:.6g}" for number in np.ravel(numbers))
+
+
+def _when(time: Usd.TimeCode) -> str:
+    return f" at time {time.GetValue():g}" if time.IsNumeric() else ""
+
+
+def _register_checks() -> None:
+    registry = UsdValidation.ValidationRegistry()
+    registry.RegisterPluginStageValidator("hdrusd.validation:StageUnits", check_stage_units)
+    registry.RegisterPluginPrimValidator("hdrusd.validation:LightIntensity", check_light)
+    registry.RegisterPluginPrimValidator("hdrusd.validation:MaterialReflectance", check_material)
+    registry.RegisterPluginPrimValidator("hdrusd.validation:AmbientLight", check_ambient)
+
+
+_register_checks()
