@@ -39,10 +39,6 @@ BUILT_IN = (
     "usdShadeValidators:MaterialBindingRelationships",
     "usdUtilsValidators:MissingReferenceValidator",
 )
-OURS = tuple(
-    f"hdrusd.validation:{name}"
-    for name in ("StageUnits", "LightIntensity", "MaterialReflectance", "AmbientLight")
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,18 +55,8 @@ class Problem:
 
 
 def validate(stage: Usd.Stage) -> list[Problem]:
-    """What the validators of keyword "hdrusd" and ``BUILT_IN`` say of a stage, errors first.
-
-    SchemaRegistrationError when USD made its list of validators before the plug-in was
-    registered.
-    """
+    """What the validators of keyword "hdrusd" and ``BUILT_IN`` say of a stage, errors first."""
     registry = UsdValidation.ValidationRegistry()
-    missing = [name for name in OURS if not registry.HasValidator(name)]
-    if missing:
-        raise SchemaRegistrationError(
-            f"USD validators: {', '.join(missing)}: unknown, because USD was asked for validators "
-            "before hdrusd registered its own; import hdrusd.usd first"
-        )
     # By keyword, so that validators that other packages file under ours run as well.
     ours = [found.name for found in registry.GetValidatorMetadataForKeyword("hdrusd")]
     validators = registry.GetOrLoadValidatorsByName([*ours, *BUILT_IN])
@@ -421,7 +407,13 @@ def _when(time: Usd.TimeCode) -> str:
 
 
 def _register_checks() -> None:
+    """SchemaRegistrationError when USD listed its validators before it knew the plug-in."""
     registry = UsdValidation.ValidationRegistry()
+    if not registry.GetValidatorMetadataForKeyword("hdrusd"):
+        raise SchemaRegistrationError(
+            "USD validators: hdrusd.validation: unknown, because USD was asked for validators "
+            "before hdrusd registered its own; import hdrusd.usd first"
+        )
     registry.RegisterPluginStageValidator("hdrusd.validation:StageUnits", check_stage_units)
     registry.RegisterPluginPrimValidator("hdrusd.validation:LightIntensity", check_light)
     registry.RegisterPluginPrimValidator("hdrusd.validation:MaterialReflectance", check_material)

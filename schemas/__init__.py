@@ -17,14 +17,19 @@ from hdrusd.errors import SchemaRegistrationError
 PLUGIN_DIR = Path(__file__).resolve().parent
 
 #: Names to apply, as ``prim.ApplyAPI`` and ``apiSchemas`` have them.
-API_SCHEMAS = ("PhotometricLightAPI", "PhotometricMaterialAPI", "AmbientAPI", "EyeAPI")
+API_SCHEMAS = (
+    "HdrusdPhotometricLightAPI",
+    "HdrusdPhotometricMaterialAPI",
+    "HdrusdAmbientAPI",
+    "HdrusdEyeAPI",
+)
 
 
 @cache
 def register() -> None:
     """Make the schemas and validators known to USD; later calls do nothing.
 
-    USD fixes its list of schemas when the first stage is made, and asking whether
+    USD fixes its list of schemas when it composes the first typed prim, and asking whether
     ours are in it fixes it too: plug-ins with schemas of their own must be
     registered before. SchemaRegistrationError when a stage came first.
     """
@@ -38,6 +43,7 @@ def register() -> None:
     missing = [name for name in API_SCHEMAS if not known.FindAppliedAPIPrimDefinition(name)]
     if missing:
         raise SchemaRegistrationError(
-            f"USD schemas: {', '.join(missing)}: unknown, because a stage was made before hdrusd "
-            f"registered them; import hdrusd.usd first, or set PXR_PLUGINPATH_NAME={PLUGIN_DIR}"
+            f"USD schemas: {', '.join(missing)}: unknown, because a stage was opened "
+            f"before hdrusd registered them; import hdrusd.usd first, "
+            f"or set PXR_PLUGINPATH_NAME={PLUGIN_DIR}"
         )

@@ -6,7 +6,8 @@ import ast
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -16,13 +17,14 @@ from hdrusd.tonemap.operator import OPERATORS
 ROOT = Path(__file__).parents[1]
 MARKDOWN = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("samples/**/*.md")])
 DECISIONS = sorted((ROOT / "docs" / "decisions").glob("*.md"))
+FINDINGS = ROOT / "docs" / "findings.md"
 MAPPING = ROOT / "docs" / "concept-mapping.md"
 
 COMMANDS = {"convert", "render", "tonemap", "check", "info", "operators", "schemas", "doctor"}
 HEADINGS = ["Decision", "Why", "Alternatives", "Consequences"]
 
 #: A finding code: words joined by hyphens.
-CODE = re.compile(r"[a-z0-9]+(-[a-z0-9]+)+")
+CODE = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 
 #: Names of one workplace, which mean nothing to anybody else. Spelt so that this file has none.
 WORKPLACE = re.compile(
@@ -59,19 +61,35 @@ def anchors(text: str) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", title).strip().lower().replace(" ", "-") for title in titles}
 
 
+def is_kind(node: ast.expr) -> bool:
+    """Whether an expression is ``Kind.DROPPED`` or another of them."""
+    return isinstance(node, ast.Attribute) and ast.unparse(node.value) == "Kind"
+
+
+def literals(nodes: Iterable[ast.expr | None]) -> list[str]:
+    """Those of ``nodes`` that are literal finding codes."""
+    values = [node.value for node in nodes if isinstance(node, ast.Constant)]
+    return [value for value in values if isinstance(value, str) and CODE.fullmatch(value)]
+
+
 def finding_codes(source: str) -> Iterator[str]:
-    """The codes in calls that make a finding: those that name a Kind, or are named for it."""
+    """The codes of findings that a module can make, as far as they are spelt out.
+
+    A code stands behind its Kind, is the key of ``(Kind, text)`` in a table, or is an
+    argument of a function that is named for findings.
+    """
     for node in ast.walk(ast.parse(source)):
-        if not isinstance(node, ast.Call):
-            continue
-        named = "finding" in ast.unparse(node.func) or any(
-            isinstance(argument, ast.Attribute) and ast.unparse(argument.value) == "Kind"
-            for argument in node.args
-        )
-        literals = [arg.value for arg in node.args if isinstance(arg, ast.Constant)]
-        codes = [text for text in literals if isinstance(text, str) and CODE.fullmatch(text)]
-        if named and codes:
-            yield codes[0]
+        if isinstance(node, ast.Dict):
+            rows = zip(node.keys, node.values, strict=True)
+            yield from literals(
+                key for key, row in rows if isinstance(row, ast.Tuple) and is_kind(row.elts[0])
+            )
+        parts = node.args if isinstance(node, ast.Call) else getattr(node, "elts", [])
+        yield from literals(code for kind, code in pairwise(parts) if is_kind(kind))
+        if isinstance(node, ast.Call) and re.search(
+            r"finding$|keep_going$", ast.unparse(node.func)
+        ):
+            yield from literals(parts)
 
 
 def test_every_command_has_help_and_is_documented() -> None:
@@ -99,19 +117,19 @@ def test_every_operator_cites_a_paper(name: str) -> None:
 
 
 def test_every_finding_code_is_documented_and_every_documented_one_exists() -> None:
-    sources = [
-        file.read_text(encoding="utf-8")
-        for folder in ("hdrusd", "cli")
-        for file in (ROOT / folder).rglob("*.py")
-    ]
+    files = [file for folder in ("hdrusd", "cli") for file in (ROOT / folder).rglob("*.py")]
+    sources = [file.read_text(encoding="utf-8") for file in files]
     made = {code for source in sources for code in finding_codes(source)}
-    section = MAPPING.read_text(encoding="utf-8").split("## Finding codes\n")[1]
-    documented = set(re.findall(r"^\| `([a-z0-9-]+)` \|", section, re.MULTILINE))
-    assert made
+    page = FINDINGS.read_text(encoding="utf-8")
+    documented = set(re.findall(r"^\| `([a-z0-9-]+)` \|", page, re.MULTILINE))
+    assert "light-range" in made
     assert made - documented == set()
     # A code may be put together at run time, so a documented one need only be spelt somewhere.
     everything = "".join(sources)
     assert {code for code in documented - made if f'"{code}"' not in everything} == set()
+    mentioned = re.findall(r"^\|.*\| ([^|]*)\|$", MAPPING.read_text(encoding="utf-8"), re.MULTILINE)
+    in_last_column = {code for cell in mentioned for code in re.findall(r"`([a-z0-9-]+)`", cell)}
+    assert in_last_column - documented == set()
 
 
 def test_decisions_are_numbered_without_gaps() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hdrusd.importers.gltf_accessors import Accessors
 from hdrusd.importers.gltf_animations import read_animations
 from hdrusd.importers.gltf_cameras import read_cameras
-from hdrusd.importers.gltf_document import Document, load
+from hdrusd.importers.gltf_document import Document, load, one_line
 from hdrusd.importers.gltf_images import Textures
 from hdrusd.importers.gltf_lights import EXTENSION, read_lights
 from hdrusd.importers.gltf_materials import default_material, read_materials
@@ -70,10 +70,10 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
 def _check_extensions(document: Document) -> None:
     for name in _names(document, "extensionsRequired"):
         if name not in EXTENSIONS:
-            raise document.root.error(f"requires the extension {name[:80]}, which is not read")
+            raise document.root.error(f"requires the extension {one_line(name)}, which is not read")
     for name in _names(document, "extensionsUsed"):
         if name not in EXTENSIONS:
-            text = f"extension {name[:80]} is not read"
+            text = f"extension {one_line(name)} is not read"
             document.root.note(Kind.DROPPED, "extension-unknown", text)
 
 

@@ -16,7 +16,7 @@ from urllib.parse import unquote, unquote_to_bytes
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.importers.gltf_document import Document, Item
+from hdrusd.importers.gltf_document import Document, Item, one_line
 from hdrusd.importers.importer import Resolver
 from hdrusd.legacy.scene import Floats
 from hdrusd.report import Kind
@@ -94,7 +94,7 @@ class Accessors:
         elif uri:
             path = resolver.find(unquote(uri), item.ref, thing=item.name)
             if path is None:
-                raise item.error(f"buffer {uri[:200]}: not found or outside the declared roots")
+                raise item.error(f"buffer {one_line(uri)}: not found or outside the declared roots")
             if path not in files:
                 files[path] = memoryview(resolver.read(path))
             content = files[path]

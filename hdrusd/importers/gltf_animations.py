@@ -50,7 +50,7 @@ class _Reader:
         target = item.child("target")
         path = target.text("path")
         if path not in _WIDTHS:
-            text = f"animation of {path[:40] or 'nothing'} dropped; a node's place can move only"
+            text = f"animation of {path[:40]!r} dropped; want translation, rotation or scale"
             target.note(Kind.DROPPED, "animation-path", text)
             return
         node = target.index("node", "nodes")

@@ -60,7 +60,7 @@ class Document:
     def keep_going(self, error: InputError, code: str, thing: str, consequence: str) -> None:
         """Turn an error about one thing into a finding; the rest of the file is used."""
         text = f"{error.problem}; {consequence}"
-        self.report.add(Kind.INVALID, code, error.source, thing, text)
+        self.report.add(Kind.INVALID, code, error.source, one_line(thing), text)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,11 +87,12 @@ class Item:
 
     def error(self, problem: str) -> InputError:
         """An error that names this place."""
-        return InputError(self.ref, f"{self.name[:80]}: {problem}" if self.name else problem)
+        name = one_line(self.name)
+        return InputError(self.ref, f"{name}: {problem}" if name else problem)
 
     def note(self, kind: Kind, code: str, text: str) -> None:
         """Add a finding about this object."""
-        self.document.report.add(kind, code, self.ref, self.name[:80], text)
+        self.document.report.add(kind, code, self.ref, one_line(self.name), text)
 
     def _wrong(self, key: str, wanted: str, instead: str) -> None:
         shown = reprlib.repr(self.data[key])
@@ -286,6 +287,11 @@ def load(resolver: Resolver, report: Report) -> Document:
 def clean(text: str) -> str:
     """``text`` with lone surrogates, which no file name and no USD string can hold, as '?'."""
     return text.encode("utf-8", "replace").decode("utf-8")
+
+
+def one_line(text: str) -> str:
+    """The beginning of ``text`` for a message: no line breaks, at most 80 characters."""
+    return " ".join(text[:80].split())
 
 
 def _glb_chunks(

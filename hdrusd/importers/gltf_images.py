@@ -11,7 +11,7 @@ from urllib.parse import unquote
 
 from hdrusd.errors import InputError
 from hdrusd.importers.gltf_accessors import Accessors, data_uri
-from hdrusd.importers.gltf_document import Document, Item
+from hdrusd.importers.gltf_document import Document, Item, one_line
 from hdrusd.importers.importer import Resolver
 from hdrusd.legacy.scene import Image, Texture, UVTransform, Wrap
 from hdrusd.report import Kind
@@ -84,7 +84,9 @@ class Textures:
             reference = unquote(uri)
             path = self._resolver.find(reference, item.ref, thing=item.name)
             if path is not None and path.suffix.lower() in (".ktx2", ".ktx"):
-                item.note(Kind.DROPPED, "texture-ktx2", f"{reference}: KTX images are not read")
+                item.note(
+                    Kind.DROPPED, "texture-ktx2", f"{one_line(reference)}: KTX images are not read"
+                )
                 path = None
             return Image(reference, item.ref, path=path)
         data: bytes | None = None

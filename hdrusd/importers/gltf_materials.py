@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from hdrusd.importers.gltf_document import Document, Item
+from hdrusd.importers.gltf_document import Document, Item, one_line
 from hdrusd.importers.gltf_images import Textures
 from hdrusd.legacy.scene import RGB, Material, Texture
 from hdrusd.report import Kind
@@ -74,7 +74,7 @@ def _material(item: Item, name: str, textures: Textures) -> Material:
     if "extensions" in item:
         dropped += sorted(set(item.child("extensions").data) - _READ_EXTENSIONS)
     if dropped:
-        text = f"dropped: no home yet for {', '.join(dropped)[:300]}"
+        text = f"dropped: no home yet for {', '.join(one_line(part) for part in dropped)}"
         item.note(Kind.DROPPED, "material-part", text)
     red, green, blue, alpha = surface.base
     return Material(

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from hdrusd.errors import InputError
 from hdrusd.importers.gltf_accessors import Accessors
-from hdrusd.importers.gltf_document import Document, Item
+from hdrusd.importers.gltf_document import Document, Item, one_line
 from hdrusd.importers.gltf_images import uv_set_name
 from hdrusd.legacy.scene import Floats, Interpolation, Ints, Material, Mesh
 from hdrusd.report import Kind
@@ -73,7 +73,7 @@ class MeshReader:
         for number, item in enumerate(document.table("meshes")):
             self.by_mesh.append(self._mesh(item, item.name or f"mesh_{number}"))
         for key, count in sorted(self._lost.items()):
-            text = f"{key[:80]} of {count} meshes dropped: no home"
+            text = f"{one_line(key)} of {count} meshes dropped: no home"
             document.root.note(Kind.DROPPED, "mesh-attribute", text)
 
     def _mesh(self, item: Item, name: str) -> list[int]:
@@ -178,7 +178,7 @@ class MeshReader:
             if len(values) != count:
                 raise attributes.error(f"{key} has {len(values)} elements, POSITION {count}")
         except InputError as error:
-            self._document.keep_going(error, "attribute-dropped", key, f"{key} dropped")
+            self._document.keep_going(error, "attribute-dropped", key, "dropped")
             return None
         finite = np.isfinite(values)
         if finite.all() or key == "NORMAL":
@@ -295,5 +295,5 @@ def _mended_normals(item: Item, normals: Floats, points: Floats, indices: Ints) 
 def _check_uv_sets(item: Item, material: Material, uvs: dict[str, Floats]) -> None:
     used = (material.diffuse_map, material.emission_map)
     for name in {texture.uv_set for texture in used if texture is not None} - set(uvs):
-        text = f"{material.name} reads texture coordinates {name}, which the mesh has not"
+        text = f"{one_line(material.name)} reads texture coordinates {name}, which the mesh has not"
         item.note(Kind.MISSING, "mesh-uv-set", text)

@@ -25,10 +25,12 @@ FIELDS = frozenset({"ambient", "diffuse", "specular", "emission", "shininess", "
 _PBR = {"pr": "roughness", "pm": "metallic"}
 _READ = {"ka", "kd", "ks", "ke", "ns", "d", "tr", "illum", "map_kd", "map_ke", "map_d", *_PBR}
 #: Known statements that have no home in the record.
-_HOMELESS = set(
-    "ni tf kt sharpness bump disp decal refl norm ps pc pcr aniso anisor map_ka map_ks map_ns "
-    "map_bump map_disp map_refl map_norm map_pr map_pm map_ps map_pc map_pcr map_tr map_aat".split()
-)
+_HOMELESS = {
+    *("ni", "tf", "kt", "sharpness", "bump", "disp", "decal", "refl", "norm"),
+    *("ps", "pc", "pcr", "aniso", "anisor", "map_pr", "map_pm", "map_ps", "map_pc", "map_pcr"),
+    *("map_ka", "map_ks", "map_ns", "map_bump", "map_disp", "map_refl", "map_norm", "map_tr"),
+    "map_aat",
+}
 #: d and Tr are each printed with three decimals or more, so they agree within that.
 _AGREE = 1e-3
 
@@ -56,23 +58,20 @@ def read(path: Path, resolver: Resolver, report: Report) -> list[Material]:
     A library that cannot be read is a finding and gives none.
     """
     try:
-        data = lines_of(resolver.read(path), path)
+        entries = _entries(lines_of(resolver.read(path), path), path, report)
     except InputError as error:
         text = f"{error.problem}; its materials become defaults"
         report.add(Kind.MISSING, "mtl-unreadable", error.source, "", text)
         return []
     images: dict[str, Image] = {}
-    return [
-        _Builder(entry, path, resolver, report, images).material()
-        for entry in _entries(data, path, report)
-    ]
+    return [_Builder(entry, path, resolver, report, images).material() for entry in entries]
 
 
 def _entries(data: bytes, path: Path, report: Report) -> list[_Entry]:
     tally = Tally()
     entries: dict[str, _Entry] = {}
     current: _Entry | None = None
-    for block in blocks(data):
+    for block in blocks(data, path):
         for index in range(block.starts.size):
             words = block.line(index).split(None, 1)
             if not words or words[0].startswith(b"#"):
@@ -83,7 +82,9 @@ def _entries(data: bytes, path: Path, report: Report) -> list[_Entry]:
             key = keyword.lower()
             if key == "newmtl":
                 current = _Entry(text, line)
-                if text in entries:
+                if not text:
+                    tally.note("mtl-nameless", line)
+                elif text in entries:
                     again = f"defined again; line {entries[text].line} counts"
                     place = SourceRef(path, line)
                     report.add(Kind.INVALID, "mtl-duplicate", place, shorten(text), again)
@@ -97,6 +98,7 @@ def _entries(data: bytes, path: Path, report: Report) -> list[_Entry]:
                 current.statements[key] = _Statement(keyword, text, line)
     texts = {
         "encoding": (Kind.ASSUMED, "words that are not UTF-8: read as Latin-1"),
+        "mtl-nameless": (Kind.INVALID, "materials without a name: ignored"),
         "mtl-stray": (Kind.INVALID, "statements before any newmtl: ignored"),
     }
     tally.report(report, path, texts)
@@ -129,7 +131,7 @@ class _Builder:
             if used is not None and key in said and not any(factor):
                 text = f"{said[key].keyword} is zero and multiplies its texture: nothing shows"
                 self._note(Kind.ASSUMED, "mtl-zero-factor", text)
-        pbr = {name: self._scalar(key, math.nan) for key, name in _PBR.items() if key in said}
+        pbr = {name: self._scalar(said[key], math.nan) for key, name in _PBR.items() if key in said}
         pbr = {name: value for name, value in pbr.items() if not math.isnan(value)}
         ambient = self._color("ka", "ambient", record.ambient)
         shininess = self._shininess(record.shininess)
@@ -190,9 +192,8 @@ class _Builder:
         self.defaults.add(name)
         return default
 
-    def _scalar(self, key: str, default: float) -> float:
-        """The first number of a statement that is there."""
-        statement = self.entry.statements[key]
+    def _scalar(self, statement: _Statement, default: float) -> float:
+        """Its first number."""
         number = next(iter(self._numbers(statement)), math.nan)
         if math.isfinite(number):
             return number
@@ -200,12 +201,13 @@ class _Builder:
         return default
 
     def _shininess(self, default: float) -> float:
-        if "ns" in self.entry.statements:
-            shininess = self._scalar("ns", math.nan)
+        statement = self.entry.statements.get("ns")
+        if statement is not None:
+            shininess = self._scalar(statement, math.nan)
             if shininess >= 0.0:
                 return shininess
             if shininess < 0.0:
-                self._broken(self.entry.statements["ns"], "an exponent of 0 or more", default)
+                self._broken(statement, "an exponent of 0 or more", default)
         self.defaults.add("shininess")
         return default
 
@@ -227,8 +229,8 @@ class _Builder:
             words = statement.text.split(None, 1)
             if words and words[0].lower() == "-halo":
                 self._note(Kind.DROPPED, "mtl-halo", "d -halo: read as plain d", statement)
-                said[key] = _Statement(statement.keyword, "".join(words[1:]), statement.line)
-            number = self._scalar(key, math.nan)
+                statement = replace(statement, text="".join(words[1:]))
+            number = self._scalar(statement, math.nan)
             if not math.isnan(number):
                 values[key] = number if key == "d" else 1.0 - number
         if not values:
@@ -247,7 +249,7 @@ class _Builder:
         statement = self.entry.statements.get("illum")
         if statement is None:
             return specular, True
-        model = self._scalar("illum", 2.0)
+        model = self._scalar(statement, 2.0)
         if model == 0.0:
             return specular, False
         if model == 1.0:
@@ -290,15 +292,15 @@ class _Builder:
         return self.images[reference]
 
     def _with_channel(self, opacity: Texture) -> Texture:
-        """Luminance is the manual's default, but of one picture for colour and opacity it is alpha."""
+        """The manual's default is luminance; of a picture that is the colour too, it is alpha."""
         said = self.entry.statements
         parsed = MapStatement.parse(said["map_d"].text)
         channel = opacity_channel(parsed)
-        if channel is None and "map_kd" in said:
-            if MapStatement.parse(said["map_kd"].text).file == parsed.file:
-                channel = "a"
-                text = "map_d is the picture of map_Kd: its alpha is read"
-                self._note(Kind.ASSUMED, "mtl-opacity-channel", text, said["map_d"])
+        color = MapStatement.parse(said["map_kd"].text).file if "map_kd" in said else ""
+        if channel is None and color == parsed.file:
+            channel = "a"
+            text = "map_d is the picture of map_Kd: its alpha is read"
+            self._note(Kind.ASSUMED, "mtl-opacity-channel", text, said["map_d"])
         return replace(opacity, channel=channel or "r")
 
     def _extras(self) -> dict[str, str]:

@@ -21,7 +21,7 @@ from hdrusd.report import Kind, Report
 Channel = Literal["rgb", "r", "g", "b", "a"]
 
 #: No file system takes a longer path; what is longer is not looked for.
-_LONGEST = 4096
+LONGEST = 4096
 
 #: Option to the most arguments that it takes, of which the first is required.
 _NUMBERS = {"-o": 3, "-s": 3, "-t": 3, "-mm": 2, "-bm": 1, "-boost": 1, "-texres": 1}
@@ -100,14 +100,16 @@ def texture(statement: MapStatement, image: Image) -> tuple[Texture, list[str]]:
         numbers = [to_float(word)[0] for word in words] + [neutral] * (3 - len(words))
         if not words or not all(math.isfinite(number) for number in numbers):
             continue
-        if numbers[2] == neutral:  # a depth is for volume textures
-            lost.remove(" ".join([option, *words]))
+        lost.remove(" ".join([option, *words]))
+        if numbers[2] != neutral:
+            lost.append(f"{option} {words[2]} in depth")
         if option == "-s":
             scale = (numbers[0], numbers[1])
         else:
             offset = (numbers[0], numbers[1])
     moved = scale != (1.0, 1.0) or offset != (0.0, 0.0)
-    wrap: Wrap = "clamp" if statement.options.get("-clamp", [""])[:1] == ["on"] else "repeat"
+    clamp = "".join(statement.options.get("-clamp", [])).lower() == "on"
+    wrap: Wrap = "clamp" if clamp else "repeat"
     transform = UVTransform(scale=scale, translation=offset) if moved else None
     return Texture(image, wrap_s=wrap, wrap_t=wrap, transform=transform), lost
 
@@ -131,7 +133,7 @@ def locate(
     A file that is exactly where a later reference says goes before one that an
     earlier reference finds elsewhere by its base name.
     """
-    if len(references[0]) > _LONGEST:
+    if len(references[0]) > LONGEST:
         text = f"{shorten(references[0])}: not a file name"
         resolver.report.add(Kind.MISSING, "file-missing", place, thing, text)
         return None

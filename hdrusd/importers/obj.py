@@ -15,7 +15,7 @@ import numpy as np
 from hdrusd.errors import SourceRef
 from hdrusd.importers import mtl
 from hdrusd.importers.importer import Resolver
-from hdrusd.importers.mtl_textures import locate
+from hdrusd.importers.mtl_textures import LONGEST, locate
 from hdrusd.importers.obj_meshes import mesh_of, recentre, usable_faces
 from hdrusd.importers.obj_statements import Statements, parse
 from hdrusd.importers.obj_text import Tally, shorten
@@ -33,8 +33,8 @@ _FINDINGS = {
     ),
     "face-point": (Kind.INVALID, "faces with a point that is not three finite numbers: dropped"),
     "normal-missing": (Kind.REPLACED, "corners without a usable normal: the face's own is taken"),
-    "obj-attributes": (Kind.DROPPED, "statements that set smoothing, display or detail"),
-    "obj-elements": (Kind.DROPPED, "statements of points, lines, curves or surfaces"),
+    "obj-attributes": (Kind.DROPPED, "statements that set smoothing, display or detail: ignored"),
+    "obj-elements": (Kind.DROPPED, "statements of points, lines, curves or surfaces: dropped"),
     "obj-unknown": (Kind.INVALID, "lines that are no OBJ statement: ignored"),
     "texcoord-depth": (Kind.DROPPED, "texture vertices with a third coordinate: it is dropped"),
     "texcoord-missing": (
@@ -49,7 +49,7 @@ _FINDINGS = {
 }
 
 #: "a.mtl b c.mtl": each name goes on until its suffix.
-_LIBRARY_NAME = re.compile(r"\S.*?\.mtl(?=\s|$)", re.IGNORECASE)
+_AFTER_SUFFIX = re.compile(r"(?<=\.mtl)\s+", re.IGNORECASE)
 
 
 def read(resolver: Resolver, report: Report) -> LegacyScene:
@@ -82,7 +82,7 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
         )
         scene.meshes.append(mesh)
     if not scene.meshes:
-        text = f"none of {file.face_counts.size} faces can be used: the scene is empty"
+        text = f"no usable face among {file.face_counts.size}: the scene is empty"
         report.add(Kind.INVALID, "obj-empty", SourceRef(source), "", text)
     tally.report(report, source, _FINDINGS)
     return scene
@@ -91,7 +91,7 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
 def _libraries(file: Statements, resolver: Resolver, report: Report) -> list[Material]:
     """The materials of all libraries; of one name the first, as the manual says of mtllib."""
     paths: dict[Path, None] = {}
-    for text, line in file.libraries:
+    for text, line in file.libraries.items():
         place = SourceRef(resolver.source, line)
         paths |= dict.fromkeys(_library_paths(text, place, resolver))
     materials: dict[str, Material] = {}
@@ -109,9 +109,9 @@ def _libraries(file: Statements, resolver: Resolver, report: Report) -> list[Mat
 def _library_paths(text: str, place: SourceRef, resolver: Resolver) -> list[Path]:
     """The files of one ``mtllib``: all of it is one name with blanks, or it is several names."""
     text = text.replace('"', " ").strip()
-    names = _LIBRARY_NAME.findall(text) or text.split()
+    names = _AFTER_SUFFIX.split(text) if ".mtl" in text.lower() else text.split()
     silent = replace(resolver, report=Report())
-    if len(names) < 2 or silent.find(text, place) is not None:
+    if not 0 < len(text) <= LONGEST or silent.find(text, place) is not None:
         names = [text]
     found = [locate([name], resolver, place, "mtllib") for name in dict.fromkeys(names)]
     return [path for path in found if path is not None]

@@ -87,7 +87,7 @@ class Statements:
     corners: Ints  # (sum of counts, 3): vertex, texture vertex, normal
     groups: list[Group]
     uses: list[MaterialUse]
-    libraries: list[tuple[str, int]]  # the text behind mtllib, and its line
+    libraries: dict[str, int]  # the text behind mtllib, and the first line with it
     generator: str
 
 
@@ -95,7 +95,7 @@ def parse(resolver: Resolver, tally: Tally) -> Statements:
     """Read ``resolver.source``. Raises InputError if it is binary or has no vertex."""
     data = lines_of(resolver.read(), resolver.source)
     collector = _Collector(resolver, tally)
-    for block in blocks(data):
+    for block in blocks(data, resolver.source):
         collector.add(block)
     comment = re.match(rb"\s*#+([^\n]*)", data[:1024])
     return collector.finish(decode(comment[1].strip(), tally, 1) if comment else "")
@@ -120,7 +120,7 @@ class _Collector:
     objects: int = 0
     #: From that line on: the group and the material.
     changes: list[tuple[int, int, int]] = field(default_factory=lambda: [(0, 0, -1)])
-    libraries: list[tuple[str, int]] = field(default_factory=list)
+    libraries: dict[str, int] = field(default_factory=dict)
 
     def add(self, block: Block) -> None:
         kind = _kinds(block)
@@ -221,7 +221,7 @@ class _Collector:
         elif keyword == b"usemtl":
             self._change(number, material=self._use(text, number) if text else -1)
         elif keyword == b"mtllib":
-            self.libraries.append((text, number))
+            self.libraries.setdefault(text, number)
         elif not (keyword in (b"s", b"mg") and text.split()[:1] in ([], ["off"], ["0"])):
             known = _CODE_OF.get(keyword)
             thing = keyword.decode() if known else ""

@@ -30,6 +30,7 @@ Integers = npt.NDArray[np.int64]
 Doubles = npt.NDArray[np.float64]
 
 _BLOCK = 1 << 22  # bytes: the work arrays of one block stay near the processor's cache
+_LONGEST_LINE = 1 << 26  # bytes: what one statement may cost in memory is a multiple of it
 _BLANK = 32  # this and every control byte below it separate words
 _NEWLINE, _SLASH, _JOINT = 10, 47, 11
 _LINE_END = re.compile(rb"(?<!\\)\n")
@@ -121,12 +122,18 @@ class Block:
         return Rows(text, starts)
 
 
-def blocks(data: bytes, size: int = _BLOCK) -> Iterator[Block]:
-    """``lines_of`` bytes as blocks of about ``size`` bytes."""
+def blocks(data: bytes, source: Path, size: int = _BLOCK) -> Iterator[Block]:
+    """``lines_of`` bytes as blocks of about ``size`` bytes.
+
+    Raises InputError for a line that no program wrote.
+    """
     start, number = 0, 1
     while start < len(data):
         match = _LINE_END.search(data, min(start + size, len(data)) - 1)
         end = match.end() if match else len(data)
+        if end - start > size + _LONGEST_LINE:
+            place = SourceRef(source, number + data.count(b"\n", start, start + size))
+            raise InputError(place, f"a line of more than {_LONGEST_LINE} bytes")
         yield _block(data[start:end], number)
         number += data.count(b"\n", start, end)
         start = end

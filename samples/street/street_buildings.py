@@ -9,7 +9,7 @@ from street_materials import MATERIALS
 from street_model import Node
 from street_openings import CORNICE, STRING_COURSE, WindowStyle, balcony, rectangle, window
 from street_shapes import Kit
-from street_shops import Shop, arcade_bay, arcade_shop, shopfront
+from street_shops import ARCADE_DEPTH, Shop, arcade_bay, arcade_shop, shopfront
 
 FLOOR = 0.14  # m, the pavement's height above the road
 GROUND = 6.0  # m, top of an arcaded ground floor
@@ -35,7 +35,7 @@ class Building:
     ground: str  # "arcade", "shops", "stone"
     storeys: tuple[Storey, ...]
     roof: str  # "mansard", "gable", "parapet"
-    windows_per_bay: int = 1
+    axes: int = 0  # windows in a storey; 0: one a bay
     depth: float = 13.0
     lit: float = 0.36  # share of the windows with a light behind them
 
@@ -92,7 +92,7 @@ def _ground_floor(kit: Kit, design: Building, rng: np.random.Generator, first_si
 
 def _storeys(kit: Kit, design: Building, rng: np.random.Generator, z: float) -> float:
     """Stack the storeys on ``z``; returns the top of the wall."""
-    count = design.bays * design.windows_per_bay
+    count = design.axes or design.bays
     step = design.width / count
     for level, storey in enumerate(design.storeys):
         for i in range(count):
@@ -180,13 +180,13 @@ def _parapet(kit: Kit, design: Building, z: float) -> float:
 
 
 def _chimneys(kit: Kit, design: Building, wall_top: float, ridge: float) -> None:
-    """A stack with four pots at each party wall."""
+    """A stack with three pots at each party wall."""
     for x in (0.5, design.width - 0.5):
         middle, top = design.depth / 2.0 - 2.2, max(ridge, wall_top + 2.0) + 1.0
         kit["Brick"].box((x - 0.3, middle - 1.2, wall_top), (x + 0.3, middle + 1.2, top), "xXyYZ")
-        for i in range(4):
-            pot = ((0.14, top), (0.11, top + 0.5), (0.13, top + 0.55))
-            kit["Chimney"].revolve(pot, 6, (x, middle - 0.9 + 0.6 * i, 0.0))
+        for i in (-1, 0, 1):
+            pot = ((0.15, top), (0.12, top + 0.55))
+            kit["Chimney"].revolve(pot, 6, (x, middle + 0.7 * i, 0.0))
 
 
 def build(design: Building, seed: int, first_sign: int = 0) -> Node:
@@ -196,11 +196,11 @@ def build(design: Building, seed: int, first_sign: int = 0) -> Node:
     kit["Trim"].extrude(np.array(CORNICE) * (0.55, 0.6) + (0.0, foot - 0.35), 0.0, design.width)
     top = _storeys(kit, design, rng, foot)
     kit["Trim"].extrude(np.array(CORNICE) + (0.0, top), 0.0, design.width)
-    blocks = np.arange(0.25, design.width, 0.5)
-    low = np.stack((blocks - 0.08, np.full(len(blocks), -0.36), np.full(len(blocks), top + 0.24)), 1)
+    blocks = np.arange(0.4, design.width, 0.8)
+    low = np.stack((blocks - 0.1, np.full(len(blocks), -0.36), np.full(len(blocks), top + 0.24)), 1)
     for corner in low:
         x, y, z = (float(v) for v in corner)
-        kit["Trim"].box((x, y, z), (x + 0.16, -0.1, z + 0.16), "xXyz")
+        kit["Trim"].box((x, y, z), (x + 0.2, -0.1, z + 0.18), "xXyz")
     if design.roof == "mansard":
         ridge = _mansard(kit, design, rng, top)
     elif design.roof == "gable":
@@ -210,7 +210,9 @@ def build(design: Building, seed: int, first_sign: int = 0) -> Node:
     _chimneys(kit, design, top, ridge)
     w, d, high = design.width, design.depth, top + 0.72
     side = kit["Ceiling"]  # party walls and the back: whitewashed
-    side.quad((0.0, d, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, high), (0.0, d, high))
-    side.quad((w, 0.0, 0.0), (w, d, 0.0), (w, d, high), (w, 0.0, high))
+    walk = ARCADE_DEPTH if design.ground == "arcade" else 0.0  # one walks through the arcade
+    for low_z, high_z, y in ((0.0, foot, walk), (foot, high, 0.0)):
+        side.quad((0.0, d, low_z), (0.0, y, low_z), (0.0, y, high_z), (0.0, d, high_z))
+        side.quad((w, y, low_z), (w, d, low_z), (w, d, high_z), (w, y, high_z))
     side.quad((w, d, 0.0), (0.0, d, 0.0), (0.0, d, high), (w, d, high))
     return Node(design.name, meshes=kit.meshes(design.name))

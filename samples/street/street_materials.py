@@ -78,6 +78,7 @@ _ALL = [
     _plain("SignalRedOff", (0.20, 0.01, 0.01), 0.3, 40.0),
     _plain("SignalAmberOff", (0.22, 0.12, 0.01), 0.3, 40.0),
     _plain("SignalGreenOff", (0.01, 0.14, 0.08), 0.3, 40.0),
+    _glowing("CrossLit", (0.03, 0.25, 0.08), (0.1, 1.0, 0.3)),
     _glowing("SignalRedLit", (0.20, 0.01, 0.01), (1.0, 0.08, 0.05)),
     _glowing("SignalGreenLit", (0.01, 0.14, 0.08), (0.05, 1.0, 0.6)),
     # cars

@@ -34,6 +34,18 @@ def turn(axis: Literal["x", "y", "z"], degrees: float) -> Quat:
     return (x, y, z, math.cos(half))
 
 
+def compose(a: Quat, b: Quat) -> Quat:
+    """The turn ``b`` followed by the turn ``a``, both about the axes of the outer space."""
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
 def rotate(q: Quat, v: Vec3) -> Vec3:
     """``v`` turned by the unit quaternion ``q``: v + 2 w (u x v) + 2 u x (u x v)."""
     u = np.array(q[:3])

@@ -112,21 +112,22 @@ def reveal(shape: Shape, hole: Opening, y0: float, y1: float, sill: bool = True)
         shape.quad((a, y0, z0), (b, y0, z0), (b, y1, z0), (a, y1, z0))
 
 
-def surround(shape: Shape, hole: Opening, width: float, projection: float) -> None:
-    """A flat moulding around a hole: its face and outer edge (``reveal`` makes the inner one)."""
+def surround(
+    shape: Shape, hole: Opening, width: float, projection: float, inner_edge: bool = False
+) -> None:
+    """A flat moulding around a hole: its face and outer edge.
+
+    The inner edge is the reveal's, when that begins at the moulding's face.
+    """
     inner, outer = hole.outline(), hole.outline(width)
     face = np.stack((inner[:-1], inner[1:], outer[1:], outer[:-1]), axis=1)
     shape.faces(_upright(face, -projection))
-    edge = np.stack(
-        (
-            _upright(outer[:-1], -projection),
-            _upright(outer[1:], -projection),
-            _upright(outer[1:], 0.0),
-            _upright(outer[:-1], 0.0),
-        ),
-        axis=1,
-    )
-    shape.faces(edge)
+    edges = [(outer, -projection, 0.0)]
+    if inner_edge:
+        edges.append((inner, 0.0, -projection))
+    for edge, front, back in edges:
+        near, far = _upright(edge, front), _upright(edge, back)
+        shape.faces(np.stack((near[:-1], near[1:], far[1:], far[:-1]), axis=1))
 
 
 def pediment(shape: Shape, x0: float, x1: float, z: float) -> None:
@@ -144,10 +145,10 @@ def pediment(shape: Shape, x0: float, x1: float, z: float) -> None:
 
 
 def railing(iron: Shape, x0: float, x1: float, z: float, y: float, height: float) -> None:
-    """Two rails and thin upright bars every quarter of a metre, at the plane ``y``."""
+    """Two rails and thin upright bars every 0.3 m, at the plane ``y``."""
     for low in (z + 0.08, z + height - 0.05):
         iron.box((x0, y - 0.02, low), (x1, y + 0.02, low + 0.05), "yYZz")
-    bars = np.arange(x0 + 0.125, x1, 0.25)
+    bars = np.arange(x0 + 0.15, x1, 0.3)
     edges = ((-0.012, 0.0), (0.0, -0.012), (0.012, 0.0))  # a bar's section: two faces to the street
     foot, head = (
         np.array([[(x + dx, y + dy, h) for dx, dy in edges] for x in bars])
@@ -193,16 +194,14 @@ def window(
     springing = z0 + style.sill + style.height - style.rise
     hole = Opening(middle - half, middle + half, z0 + style.sill, springing, style.rise)
     wall(kit[wall_name], bounds, hole)
-    projection = 0.06 if style.surround else 0.0
     trim = kit["Trim"]
-    reveal(trim if style.surround else kit[wall_name], hole, -projection, 0.26)
+    reveal(trim, hole, -0.06, 0.26, sill=False)
     a, b, low, high = hole.left, hole.right, hole.bottom, hole.top
     corners = ((a, 0.22, low), (b, 0.22, low), (b, 0.22, high), (a, 0.22, high))
     kit[pane].picture(corners, (0.0, 0.0, 1.0, 1.0))
     edge = style.surround
-    if edge:
-        surround(trim, hole, edge, projection)
-    trim.box((a - edge - 0.06, -0.16, low - 0.12), (b + edge + 0.06, 0.0, low), "xXyzZ")
+    surround(trim, hole, edge, 0.06)
+    trim.box((a - edge - 0.06, -0.16, low - 0.12), (b + edge + 0.06, 0.26, low), "xXyzZ")
     if style.hood == "hood":
         profile = np.array(HOOD) + (0.0, high + edge)
         trim.extrude(profile, a - edge - 0.14, b + edge + 0.14)

@@ -38,9 +38,9 @@ class Shop:
 
 
 def shopfront(kit: Kit, shop: Shop, x0: float, x1: float, z: float, y: float) -> float:
-    """A shopfront between x0 and x1, 3.9 m high from the floor ``z``; returns its top.
+    """A shopfront between x0 and x1 on the floor ``z``; returns its top, 3.71 m above.
 
-    Raises nothing; the wall above is the caller's.
+    The wall above it is the caller's.
     """
     wood = kit[shop.joinery]
     sill, head, fascia = z + 0.55, z + 2.85, z + 3.45
@@ -120,12 +120,13 @@ def arcade_bay(kit: Kit, x0: float, x1: float, z: float, top: float, stone: str)
     reveal(front, hole, 0.0, PIER_DEPTH, sill=False)
     wall(kit["Trim"], (x0, x1, z, ARCADE_CEILING), hole, PIER_DEPTH, back=True)
     ring = Opening(hole.left, hole.right, hole.springing, hole.springing, hole.rise, 12)
-    surround(trim, ring, 0.30, 0.06)
+    surround(trim, ring, 0.30, 0.06, inner_edge=True)
     middle, crown = (x0 + x1) / 2.0, hole.top
     trim.box((middle - 0.17, -0.16, crown - 0.05), (middle + 0.17, 0.0, crown + 0.52), "xXyzZ")
-    for side, edge in ((x0, hole.left), (hole.right, x1)):
-        trim.box((side, -0.09, hole.springing - 0.22), (edge, PIER_DEPTH, hole.springing), "xXyzZ")
-        trim.box((side, -0.08, z), (edge, PIER_DEPTH, z + 0.55), "xXyZ")
+    high = hole.springing
+    for a, b, side in ((x0, hole.left + 0.06, "X"), (hole.right - 0.06, x1, "x")):
+        trim.box((a, -0.09, high - 0.22), (b, PIER_DEPTH + 0.06, high), side + "yYzZ")
+        trim.box((a, -0.08, z), (b, PIER_DEPTH + 0.06, z + 0.55), side + "yYZ")
     roof, back = kit["Ceiling"], ARCADE_DEPTH
     corners = ((x0, back, ARCADE_CEILING), (x1, back, ARCADE_CEILING))
     roof.quad(*corners, (x1, PIER_DEPTH, ARCADE_CEILING), (x0, PIER_DEPTH, ARCADE_CEILING))

@@ -1,0 +1,206 @@
+"""The texture files of a conversion: the look's copies, reflectance maps, HDR maps.
+
+R = T^gamma * D per channel (Petit and Bremond 2010, section 3) as a linear half-float
+EXR, alpha untouched: 11 bits are a relative rounding of 2^-11, finer than the 256
+codes it is made from. An HDR map is T^gamma scaled so that its brightest texel has
+luminance 1 (section 4); the material gives it its cd/m2. Every file is written once,
+however many materials share it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from hdrusd.errors import InputError, SourceRef
+from hdrusd.images import read_image, write_exr, write_png
+from hdrusd.legacy.scene import RGB, Image, Texture
+from hdrusd.photometry.reflectance import reflectance_table
+from hdrusd.report import Kind, Report
+from hdrusd.units import LUMINANCE_WEIGHTS
+from hdrusd.usd.material import Map
+
+#: Formats that every USD renderer reads; others are kept as PNG.
+_PORTABLE = {".png", ".jpg", ".jpeg", ".exr"}
+
+#: Above this a half float has no value.
+_HALF_MAX = 65504.0
+
+Floats = npt.NDArray[np.float64]
+
+
+class MapWriter:
+    """Writes into ``folder``; ``prefix`` is what the layers call that folder."""
+
+    def __init__(self, folder: Path, prefix: str, report: Report) -> None:
+        self.folder = folder
+        self.prefix = prefix
+        self.report = report
+        self.written: dict[str, dict[str, object]] = {}  # file -> what it is, for the report
+        self._pixels: dict[str, npt.NDArray[np.generic] | None] = {}
+        self._looks: dict[str, str] = {}
+
+    def look(self, texture: Texture) -> Map | None:
+        """A copy of the image as it was; None where it is missing or broken."""
+        key = self._key(texture.image)
+        if key is None:
+            return None
+        if key not in self._looks:
+            name = self._copy(texture.image, key)
+            if name is None:
+                return None
+            self._looks[key] = name
+        return Map(f"{self.prefix}/{self._looks[key]}", texture, raw=False)
+
+    def reflectance(
+        self, texture: Texture, diffuse: RGB, gamma: float, place: SourceRef, thing: str
+    ) -> Map | None:
+        """The reflectance map of a texture under diffuse colour D; None where it cannot be had."""
+        key = self._key(texture.image)
+        pixels = None if key is None else self._read(texture.image, key)
+        if key is None or pixels is None:
+            return None
+        name = _name(texture.image, "R", f"{key}|{gamma!r}|{diffuse!r}")
+        if name not in self.written:
+            color = linear(pixels, gamma) * np.asarray(diffuse)
+            over = color > 1.0
+            if over.any():
+                share = 100.0 * float(over.any(axis=-1).mean())
+                self.report.add(
+                    Kind.CLAMPED,
+                    "reflectance-clipped",
+                    place,
+                    thing,
+                    f"{texture.image.name}: reflectance above 1 in {share:.3g} % of the texels "
+                    f"(at most {float(color.max()):.4g}); clipped to 1",
+                )
+            self._write(name, np.minimum(color, 1.0), pixels)
+            self.written[name] = {
+                "kind": "reflectance",
+                "image": texture.image.name,
+                "gamma": gamma,
+                "diffuse": list(diffuse),
+                "clipped_texels": int(over.any(axis=-1).sum()),
+            }
+        return Map(f"{self.prefix}/{name}", texture, raw=True)
+
+    def luminance(self, texture: Texture, gamma: float, scale: RGB, *, peak: bool) -> Map | None:
+        """An emission map in linear values times ``scale`` (cd/m2).
+
+        ``peak``: normalised first, so that the brightest texel has luminance 1.
+        """
+        key = self._key(texture.image)
+        pixels = None if key is None else self._read(texture.image, key)
+        if key is None or pixels is None:
+            return None
+        name = _name(texture.image, "L", f"{key}|{gamma!r}|{peak}")
+        if name not in self.written:
+            color = linear(pixels, gamma)
+            top = float((color @ np.asarray(LUMINANCE_WEIGHTS)).max(initial=0.0))
+            if peak and top > 0.0:
+                color = color / top
+            self._write(name, np.minimum(color, _HALF_MAX), pixels)
+            self.written[name] = {
+                "kind": "hdr" if peak else "emission",
+                "image": texture.image.name,
+                "gamma": gamma,
+                "peak_before": top,
+            }
+        return Map(f"{self.prefix}/{name}", texture, raw=True, scale=scale)
+
+    def _write(self, name: str, color: Floats, pixels: npt.NDArray[np.generic]) -> None:
+        channels = pixels.shape[2]
+        if channels in (2, 4):
+            alpha = pixels[..., channels - 1 :].astype(np.float64)
+            alpha = alpha / 255.0 if pixels.dtype == np.uint8 else alpha
+            color = np.concatenate([color, alpha], axis=-1)
+        write_exr(self.folder / name, color, half=True, luminance=False)
+
+    def _copy(self, image: Image, key: str) -> str | None:
+        pixels = self._read(image, key)
+        if pixels is None:
+            return None
+        data = image.data if image.data is not None else None
+        if data is None and image.path is not None:
+            data = image.path.read_bytes()
+        suffix = _suffix(data)
+        if data is not None and suffix in _PORTABLE:
+            name = _name(image, "", key, suffix)
+            (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (self.folder / name).write_bytes(data)
+        else:
+            name = _name(image, "", key, ".png")
+            write_png(self.folder / name, _eight_bit(pixels))
+        self.written.setdefault(name, {"kind": "look", "image": image.name})
+        return name
+
+    def _key(self, image: Image) -> str | None:
+        if image.missing:
+            return None
+        if image.path is not None:
+            return str(image.path)
+        data = image.data if image.data is not None else _bytes(image.pixels)
+        return hashlib.sha256(data).hexdigest()
+
+    def _read(self, image: Image, key: str) -> npt.NDArray[np.generic] | None:
+        if key not in self._pixels:
+            try:
+                if image.pixels is not None:
+                    self._pixels[key] = image.pixels.reshape(*image.pixels.shape[:2], -1)
+                else:
+                    path = image.path or Path(_stem(image) + (_suffix(image.data) or ".img"))
+                    self._pixels[key] = read_image(path, image.data).pixels
+            except InputError as problem:
+                self.report.add(
+                    Kind.INVALID, "image-broken", image.source, image.name, problem.problem
+                )
+                self._pixels[key] = None
+        return self._pixels[key]
+
+
+def linear(pixels: npt.NDArray[np.generic], gamma: float) -> Floats:
+    """Colour of an image in linear values, (h, w, 3): T^gamma for integers, floats as they are.
+
+    8-bit codes go through a table, which is exact; grey is spread over three channels.
+    """
+    color = pixels[..., :1] if pixels.shape[2] < 3 else pixels[..., :3]
+    if pixels.dtype == np.uint8:
+        values = reflectance_table(gamma, 1.0)[color]
+    else:
+        values = np.nan_to_num(color.astype(np.float64), posinf=_HALF_MAX, neginf=0.0)
+    return np.asarray(np.broadcast_to(values, (*pixels.shape[:2], 3)))
+
+
+def _eight_bit(pixels: npt.NDArray[np.generic]) -> npt.NDArray[np.uint8]:
+    if pixels.dtype == np.uint8:
+        return np.asarray(pixels, np.uint8)
+    scaled = np.clip(pixels.astype(np.float64), 0.0, 1.0) * 255.0 + 0.5
+    return scaled.astype(np.uint8)
+
+
+def _bytes(pixels: npt.NDArray[np.uint8] | None) -> bytes:
+    return b"" if pixels is None else f"{pixels.shape}".encode() + pixels.tobytes()
+
+
+def _suffix(data: bytes | None) -> str:
+    """The format by its first bytes; a file's own suffix is not believed."""
+    magic = (data or b"")[:8]
+    known = {b"\x89PNG": ".png", b"\xff\xd8\xff": ".jpg", b"v/1\x01": ".exr", b"DDS ": ".dds"}
+    for start, suffix in known.items():
+        if magic.startswith(start):
+            return suffix
+    return ""
+
+
+def _stem(image: Image) -> str:
+    name = image.path.stem if image.path is not None else Path(image.name.replace("\\", "/")).stem
+    return re.sub(r"[^A-Za-z0-9_-]+", "_", name)[:48].strip("_") or "image"
+
+
+def _name(image: Image, role: str, key: str, suffix: str = ".exr") -> str:
+    digest = hashlib.sha256(key.encode()).hexdigest()[:8]
+    return "_".join(part for part in (_stem(image), role, digest) if part) + suffix

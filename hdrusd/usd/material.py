@@ -1,0 +1,221 @@
+"""``write_look`` and ``write_photometric``: one Material prim, two layers.
+
+The look layer holds the database as it was (8-bit textures, marked sRGB); the
+photometry layer puts a second surface over it, with reflectance maps (raw), cd/m2
+and our schema. Muting either leaves the other whole.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
+
+from hdrusd.legacy.scene import RGB, Material, Texture, UVTransform
+from hdrusd.usd.preview import roughness_from_shininess
+
+_API = "HdrusdPhotometricMaterialAPI"
+
+
+@dataclass(frozen=True, slots=True)
+class Map:
+    """A texture file as a material uses it; ``file`` is relative to the layer."""
+
+    file: str
+    texture: Texture
+    raw: bool
+    scale: RGB = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """What a surface is in photometric terms, ready to be written."""
+
+    diffuse: RGB  # D
+    gamma: float
+    diffuse_map: Map | None = None  # reflectance map, R = T^gamma D
+    source_texture: str = ""
+    emission: RGB = (0.0, 0.0, 0.0)  # cd/m2, at 1.0 of its map
+    luminance: float = 0.0  # cd/m2
+    emission_map: Map | None = None
+    replaces_reflection: bool = False
+    opacity_map: Map | None = None
+    vertex_color: str = ""
+    provenance: str = ""
+    rule: str = ""
+    source: str = ""
+
+
+def write_look(
+    stage: Usd.Stage, path: Sdf.Path, material: Material, maps: dict[str, Map], vertex_color: str
+) -> None:
+    """The legacy look as UsdPreviewSurface; ``maps`` by "diffuse", "emission", "opacity"."""
+    network = _Network(stage, path, "Look")
+    network.color("diffuseColor", material.diffuse, maps.get("diffuse"), vertex_color)
+    network.color("emissiveColor", _shown(material), maps.get("emission"), "")
+    _write_common(network, material, maps.get("opacity"))
+
+
+def write_photometric(
+    stage: Usd.Stage, path: Sdf.Path, material: Material, surface: Surface
+) -> None:
+    """The photometric surface over the look, and the schema that says how it came about."""
+    network = _Network(stage, path, "Photometric")
+    black = (0.0, 0.0, 0.0)
+    if surface.replaces_reflection:
+        network.color("diffuseColor", black, None, "")
+    else:
+        network.color("diffuseColor", surface.diffuse, surface.diffuse_map, surface.vertex_color)
+    network.color("emissiveColor", surface.emission, surface.emission_map, "")
+    _write_common(network, material, surface.opacity_map, dark=surface.replaces_reflection)
+    prim = network.material.GetPrim()
+    prim.ApplyAPI(_API)
+    types = Sdf.ValueTypeNames
+    _set(prim, "photometric:gamma", types.Float, surface.gamma)
+    _set(prim, "photometric:diffuse", types.Color3f, Gf.Vec3f(*surface.diffuse))
+    if surface.source_texture:
+        _set(prim, "photometric:sourceTexture", types.Asset, Sdf.AssetPath(surface.source_texture))
+    if surface.luminance > 0.0:
+        value = prim.CreateAttribute("photometric:luminance", types.Float, False)
+        value.Set(surface.luminance)
+    if surface.emission_map is not None:
+        asset = Sdf.AssetPath(surface.emission_map.file)
+        _set(prim, "photometric:hdrTexture", types.Asset, asset)
+    if surface.vertex_color:
+        _set(prim, "photometric:vertexColor", types.Token, surface.vertex_color)
+    if surface.provenance:
+        _set(prim, "photometric:provenance", types.Token, surface.provenance)
+    if surface.rule:
+        _set(prim, "photometric:rule", types.String, surface.rule)
+    if surface.source:
+        _set(prim, "photometric:source", types.String, surface.source)
+    if material.pbr is None:
+        specular = black if surface.replaces_reflection else material.specular
+        _set(prim, "legacy:specularColor", types.Color3f, Gf.Vec3f(*specular))
+        _set(prim, "legacy:shininess", types.Float, material.shininess)
+    _set(prim, "legacy:ambient", types.Color3f, Gf.Vec3f(*material.ambient))
+    _set(prim, "legacy:emission", types.Color3f, Gf.Vec3f(*material.emission))
+
+
+def _shown(material: Material) -> RGB:
+    """Emission as the LDR look shows it: cd/m2 has no place there, white is 1."""
+    peak = max(material.emission)
+    if not material.emission_cd_m2 or peak <= 1.0:
+        return material.emission
+    r, g, b = (c / peak for c in material.emission)
+    return r, g, b
+
+
+def _write_common(
+    network: _Network, material: Material, opacity: Map | None, *, dark: bool = False
+) -> None:
+    """Gloss and opacity, which both surfaces share; a dark one reflects nothing at all."""
+    pbr = material.pbr
+    if pbr is None or dark:
+        network.number("useSpecularWorkflow", 1, Sdf.ValueTypeNames.Int)
+        specular = (0.0, 0.0, 0.0) if dark else material.specular
+        network.color("specularColor", specular, None, "")
+        network.number("roughness", roughness_from_shininess(material.shininess))
+    else:
+        network.number("metallic", float(pbr.get("metallic", 0.0)))
+        network.number("roughness", float(pbr.get("roughness", 0.5)))
+    if material.alpha_mode == "opaque":
+        return
+    if opacity is not None:
+        network.scalar("opacity", opacity, material.alpha)
+    else:
+        network.number("opacity", material.alpha)
+    if material.alpha_mode == "mask":
+        network.number("opacityThreshold", material.alpha_cutoff)
+
+
+class _Network:
+    """One UsdPreviewSurface under a Material, texture nodes made as they are asked for."""
+
+    def __init__(self, stage: Usd.Stage, path: Sdf.Path, name: str) -> None:
+        self.stage = stage
+        self.material = UsdShade.Material.Define(stage, path)
+        self.path = path.AppendChild(name)
+        self.surface = UsdShade.Shader.Define(stage, self.path)
+        self.surface.CreateIdAttr("UsdPreviewSurface")
+        output = self.surface.CreateOutput("surface", Sdf.ValueTypeNames.Token)
+        self.material.CreateSurfaceOutput().ConnectToSource(output)
+
+    def color(self, name: str, value: RGB, used: Map | None, primvar: str) -> None:
+        port = self.surface.CreateInput(name, Sdf.ValueTypeNames.Color3f)
+        port.Set(Gf.Vec3f(*value))
+        if used is not None:
+            port.ConnectToSource(self._texture(name, used), "rgb")
+        elif primvar:
+            reader = self._node(f"{name}_primvar", "UsdPrimvarReader_float3")
+            reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set(primvar)
+            reader.CreateInput("fallback", Sdf.ValueTypeNames.Float3).Set(Gf.Vec3f(*value))
+            reader.CreateOutput("result", Sdf.ValueTypeNames.Float3)
+            port.ConnectToSource(reader.ConnectableAPI(), "result")
+
+    def number(
+        self, name: str, value: float, kind: Sdf.ValueTypeName = Sdf.ValueTypeNames.Float
+    ) -> None:
+        self.surface.CreateInput(name, kind).Set(value)
+
+    def scalar(self, name: str, used: Map, factor: float) -> None:
+        """One channel of a texture, times ``factor``."""
+        port = self.surface.CreateInput(name, Sdf.ValueTypeNames.Float)
+        scaled = Map(used.file, used.texture, used.raw, (factor, factor, factor))
+        channel = "r" if used.texture.channel == "rgb" else used.texture.channel
+        node = self._texture(name, scaled, alpha=factor)
+        port.ConnectToSource(node, channel)
+
+    def _texture(self, name: str, used: Map, alpha: float = 1.0) -> UsdShade.ConnectableAPI:
+        node = self._node(f"{name}_texture", "UsdUVTexture")
+        types, texture = Sdf.ValueTypeNames, used.texture
+        node.CreateInput("file", types.Asset).Set(Sdf.AssetPath(used.file))
+        node.CreateInput("sourceColorSpace", types.Token).Set("raw" if used.raw else "sRGB")
+        node.CreateInput("wrapS", types.Token).Set(texture.wrap_s)
+        node.CreateInput("wrapT", types.Token).Set(texture.wrap_t)
+        if used.scale != (1.0, 1.0, 1.0) or alpha != 1.0:
+            node.CreateInput("scale", types.Float4).Set(Gf.Vec4f(*used.scale, alpha))
+        reader = self._node(f"{name}_st", "UsdPrimvarReader_float2")
+        reader.CreateInput("varname", types.String).Set(texture.uv_set)
+        reader.CreateOutput("result", types.Float2)
+        coordinates = reader
+        if texture.transform is not None:
+            coordinates = self._transform(name, texture.transform, reader)
+        node.CreateInput("st", types.Float2).ConnectToSource(
+            coordinates.ConnectableAPI(), "result"
+        )
+        for output, kind in (("rgb", types.Float3), *((c, types.Float) for c in "rgba")):
+            node.CreateOutput(output, kind)
+        return node.ConnectableAPI()
+
+    def _transform(
+        self, name: str, transform: UVTransform, reader: UsdShade.Shader
+    ) -> UsdShade.Shader:
+        node = self._node(f"{name}_transform", "UsdTransform2d")
+        types = Sdf.ValueTypeNames
+        node.CreateInput("in", types.Float2).ConnectToSource(reader.ConnectableAPI(), "result")
+        node.CreateInput("scale", types.Float2).Set(Gf.Vec2f(*transform.scale))
+        node.CreateInput("rotation", types.Float).Set(transform.rotation)
+        node.CreateInput("translation", types.Float2).Set(Gf.Vec2f(*transform.translation))
+        node.CreateOutput("result", types.Float2)
+        return node
+
+    def _node(self, name: str, kind: str) -> UsdShade.Shader:
+        node = UsdShade.Shader.Define(self.stage, self.path.AppendChild(name))
+        node.CreateIdAttr(kind)
+        return node
+
+
+def _set(prim: Usd.Prim, name: str, kind: Sdf.ValueTypeName, value: object) -> None:
+    prim.CreateAttribute(name, kind, False, Sdf.VariabilityUniform).Set(value)
+
+
+def bind(prim: Usd.Prim, material: Sdf.Path) -> None:
+    """Bind a material by path; its prim may stand in another layer."""
+    UsdShade.MaterialBindingAPI.Apply(prim).GetDirectBindingRel().SetTargets([material])
+
+
+def bind_faces(mesh: UsdGeom.Mesh, name: str, faces: object, material: Sdf.Path) -> None:
+    """Bind a material to some faces of a mesh."""
+    subset = UsdGeom.Subset.CreateGeomSubset(mesh, name, UsdGeom.Tokens.face, faces, "materialBind")
+    bind(subset.GetPrim(), material)

@@ -1,0 +1,35 @@
+"""Makes the sample street: ``python samples/street/make_street.py OUTDIR``.
+
+Writes ``street.osgt``, ``street.gltf`` with ``street.bin`` and ``textures/*.png``,
+and copies ``photometry.toml`` beside them. The same bytes each time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+from pathlib import Path
+
+from street_layout import street
+from street_model import count_triangles, instances
+from street_textures import write_textures
+from write_gltf import write_gltf
+from write_osgt import write_osgt
+
+
+def main() -> None:
+    """Make the street in the folder that the command line names."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("outdir", type=Path, help="folder to write into; made when missing")
+    out: Path = parser.parse_args().outdir
+    write_textures(out / "textures")
+    root = street()
+    write_osgt(root, out / "street.osgt")
+    write_gltf(root, out / "street.gltf")
+    shutil.copyfile(Path(__file__).with_name("photometry.toml"), out / "photometry.toml")
+    lights = sum(node.light is not None for node in instances(root))
+    print(f"{out}: {count_triangles(root)} triangles, {lights} lights")
+
+
+if __name__ == "__main__":
+    main()
