@@ -26,24 +26,22 @@ vec3 with_luminance(vec3 rgb, float target)
     return rgb * (y < DARKEST ? 0.0 : target / max(y, DARKEST));
 }
 
-// Display-linear RGB >= 0 of luminance y into [0, 1], toward the grey of that luminance.
+// Display-linear RGB >= 0 of luminance y into [0, 1], toward the grey of that luminance;
+// but for a rounding, which quantise() takes off.
 vec3 to_gamut(vec3 rgb, float y)
 {
     float grey = min(y, 1.0);
     float most = max(rgb.r, max(rgb.g, rgb.b));
     float share = most > 1.0 ? (1.0 - grey) / (most - grey) : 1.0;
-    return clamp(grey + share * (rgb - grey), 0.0, 1.0);
+    return grey + share * (rgb - grey);
 }
 
 // Display-linear [0, 1] to code values [0, 1], good for 8 bits; why and how good: colour.py
 vec3 srgb_encode_fit(vec3 linear)
 {
     vec3 q = sqrt(sqrt(linear));
-    vec3 p = 0.0784464 * q - 0.3289604;
-    p = p * q + 1.1174777;
-    p = p * q + 0.1978412;
-    p = p * q - 0.0648049;
-    return mix(12.92 * linear, p, greaterThan(linear, vec3(0.0031308)));
+    vec3 curve = ((0.9451641 - 0.1323570 * q) * q + 0.2595052) * q - 0.0723123;
+    return mix(12.92 * linear, curve, greaterThan(linear, vec3(0.0031308)));
 }
 
 // Code values [0, 1] to display-linear [0, 1].

@@ -29,7 +29,7 @@ CODE = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 #: Names of one workplace, which mean nothing to anybody else. Spelt so that this file has none.
 WORKPLACE = re.compile(
     r"/wor[k]/|/far[m]/|\.librar[y]\b|before-sto[p]|\bCE[O]\b|co-enginee[r]"
-    r"|\b(?:hous[e]|importer[s]|human_visio[n]|performanc[e]|ecosyste[m]|styl[e]|brie[f])\.md\b"
+    r"|\b(?:hous[e]|importer[s]|performanc[e]|ecosyste[m]|styl[e]|brie[f])\.md\b|human_visio[n]"
     r"|(?i:\b(?:close|fixe|resolve)s #\d)"
 )
 
@@ -89,7 +89,7 @@ def finding_codes(source: str) -> Iterator[str]:
         if isinstance(node, ast.Call) and re.search(
             r"finding$|keep_going$", ast.unparse(node.func)
         ):
-            yield from literals(parts)
+            yield from literals(parts)[:1]
 
 
 def test_every_command_has_help_and_is_documented() -> None:
@@ -111,9 +111,9 @@ def test_every_option_has_help(command: str) -> None:
 
 
 @pytest.mark.parametrize("name", OPERATORS.names())
-def test_every_operator_cites_a_paper(name: str) -> None:
-    cite = OPERATORS[name].cite
-    assert re.search(r"\b(19|20)\d\d\b", cite), f"{name}: {cite!r} names no year"
+def test_every_operator_cites_its_source(name: str) -> None:
+    # An author or a standard, and a work of theirs: "Ward, falsecolor, Radiance".
+    assert re.search(r"[A-Z]\w+.*,\s*\S", OPERATORS[name].cite)
 
 
 def test_every_finding_code_is_documented_and_every_documented_one_exists() -> None:

@@ -25,7 +25,7 @@ LAYERS = (
     {"photometry", "tonemap"},
     {"importers", "images"},
     {"usd", "gpu"},
-    {"maps", "validation"},
+    {"display", "maps", "validation"},
     {"convert", "render"},
     {"testing"},
     {"cli"},
@@ -33,8 +33,8 @@ LAYERS = (
 
 #: Who may import what does not come with Python; NumPy is everybody's.
 THIRD_PARTY = {
-    "pxr": {"schemas", "usd", "validation"},
-    "moderngl": {"gpu"},
+    "pxr": {"schemas", "usd", "validation", "convert", "render"},
+    "moderngl": {"gpu", "display", "render"},
     "OpenEXR": {"images"},
     "OpenImageIO": {"images"},
     "click": {"cli"},
@@ -117,7 +117,7 @@ def test_imports_point_downwards(module: str, file: Path) -> None:
         ("hdrusd.importers.obj", "def read():\n    from hdrusd.convert import convert"),
         ("hdrusd.registry", "X.add('osg', 'hdrusd.importers.osg:read')"),
         ("hdrusd.photometry.light", "import moderngl"),
-        ("hdrusd.convert", "from pxr import Usd"),
+        ("hdrusd.importers.gltf", "from pxr import Usd"),
         ("hdrusd.render", "import click.testing"),
         ("hdrusd.usd.mesh", "import scipy.sparse"),
     ],

@@ -101,9 +101,7 @@ class Resolver:
                 )
             return found
         why = (
-            "outside the declared roots; add --root"
-            if refused
-            else "not found; add --search-path"
+            "outside the declared roots; add --root" if refused else "not found; add --search-path"
         )
         code = "file-refused" if refused else "file-missing"
         self.report.add(Kind.MISSING, code, place, thing, f"{reference}: {why}")

@@ -141,7 +141,7 @@ def locate(
     for reference in references:
         trial = replace(resolver, report=Report())
         found = trial.find(reference, place, thing=thing)
-        if found is not None and not len(trial.report):
+        if found is not None and _is_as_written(reference, found, resolver):
             return found
         if found is not None and elsewhere is None:
             elsewhere = found, trial.report
@@ -150,3 +150,11 @@ def locate(
     for finding in elsewhere[1]:
         resolver.report.add(finding.kind, finding.code, finding.source, finding.thing, finding.text)
     return elsewhere[0]
+
+
+def _is_as_written(reference: str, found: Path, resolver: Resolver) -> bool:
+    written = resolver.source.parent / reference.strip().replace("\\", "/")
+    try:
+        return written.samefile(found)
+    except (OSError, ValueError):  # not there, or no name for this file system
+        return False

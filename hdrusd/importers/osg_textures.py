@@ -89,6 +89,15 @@ class TextureReader:
         left = {"wrap_s": wrap_s, "wrap_t": wrap_t}
         return made, frozenset(name for name, wrap in left.items() if wrap is None)
 
+    def name(self, texture: Statement) -> str:
+        """The file name that a texture gives, without looking for the file."""
+        named = self.document.field(texture, "file")
+        holder = self.document.field(texture, "image")
+        if named is not None and len(named.words) > 1:
+            return named.words[1]
+        resolved = None if holder is None else self.document.resolve(holder)
+        return "" if resolved is None else self.document.word(resolved, "filename") or ""
+
     def image(self, texture: Statement) -> Image | None:
         """The image of a texture; None, with a finding, where there is none."""
         document = self.document

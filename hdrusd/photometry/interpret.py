@@ -76,7 +76,10 @@ class Interpreter:
         radius = (rule.number("radius") if rule else None) or LAMP_RADIUS
         if kind != "distant" and (rule is None or "radius" not in rule.values):
             self._note(
-                light, Kind.ASSUMED, "lamp-radius", f"lamp of {LAMP_RADIUS} m radius; none is stated"
+                light,
+                Kind.ASSUMED,
+                "lamp-radius",
+                f"lamp of {LAMP_RADIUS} m radius; none is stated",
             )
         return PhotometricLight(
             kind="spot" if cutoff < 180.0 or light.spot_exponent > 0.0 else kind,
@@ -157,7 +160,10 @@ class Interpreter:
             )
         if light.candela is None and light.lux is None and light.specular != light.diffuse:
             self._note(
-                light, Kind.DROPPED, "light-specular", "own specular colour; the diffuse one is used"
+                light,
+                Kind.DROPPED,
+                "light-specular",
+                "own specular colour; the diffuse one is used",
             )
         if light.candela is not None and light.spot_inner is not None:
             self._note(

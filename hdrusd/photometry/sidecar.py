@@ -196,9 +196,7 @@ def _checked(
 
 def _fits(value: Any, kind: Any) -> bool:
     if kind is list:
-        return (
-            isinstance(value, list) and len(value) == 3 and all(_fits(v, _NUMBER) for v in value)
-        )
+        return isinstance(value, list) and len(value) == 3 and all(_fits(v, _NUMBER) for v in value)
     if kind == _NUMBER:
         number = isinstance(value, _NUMBER) and not isinstance(value, bool)
         return bool(number and math.isfinite(value) and value >= 0)

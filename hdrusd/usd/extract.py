@@ -17,6 +17,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.report import Kind, Report
 from hdrusd.scene import LIGHT, NO_CONE, Camera, Draw, Geometry, Material, RenderScene
+from hdrusd.units import dome_luminance
 from hdrusd.usd.camera import Conform, framing_camera, read_camera
 from hdrusd.usd.instancer import instancer_draws
 from hdrusd.usd.light import light_time_varying, read_dome, read_light_row
@@ -97,8 +98,8 @@ class StageReader:
         self._plan: _Plan | None = None
         self._geometries: dict[tuple[str, int], Geometry | None] = {}
 
-    def read(self, time: float, camera: Camera) -> RenderScene:
-        """Everything at a time code, in world metres."""
+    def read(self, time: float, camera: Camera, *, sky_visible: bool = False) -> RenderScene:
+        """Everything at a time code, in world metres. ``sky_visible``: seen behind the scene."""
         code = Usd.TimeCode(time)
         cache = UsdGeom.XformCache(code)
         if self._plan is None:
@@ -107,12 +108,13 @@ class StageReader:
         rows = [row for light in plan.lights if (row := self._light(light, cache)) is not None]
         lights = np.concatenate(rows) if rows else np.zeros(0, LIGHT)
         ambient = self._ambient(code)
-        background = (0.0, 0.0, 0.0)
         if not len(lights) and not any(ambient) and self.default_sky:
             lights, ambient = _default_light(camera), (DEFAULT_SKY,) * 3
             self._finding(
-                Kind.ASSUMED, "default-sky", f"no light: shown under {DEFAULT_SKY:g} lx of sky "
-                f"and {DEFAULT_SKY:g} lx from the camera; --disableCameraLight leaves it dark"
+                Kind.ASSUMED,
+                "default-sky",
+                f"no light: shown under {DEFAULT_SKY:g} lx of sky "
+                f"and {DEFAULT_SKY:g} lx from the camera; --disableCameraLight leaves it dark",
             )
         draws: list[Draw] = []
         for gprim in plan.gprims:
@@ -125,7 +127,7 @@ class StageReader:
             draws=tuple(_merge(draws)),
             materials=tuple(self.materials),
             ambient=ambient,
-            background=background,
+            background=_sky_luminance(ambient) if sky_visible else (0.0, 0.0, 0.0),
             camera=camera,
             time=time,
         )
@@ -296,9 +298,7 @@ class StageReader:
         r, g, b = (float(v) for v in total)
         return r, g, b
 
-    def _draws(
-        self, gprim: Gprim, cache: UsdGeom.XformCache, code: Usd.TimeCode
-    ) -> Iterable[Draw]:
+    def _draws(self, gprim: Gprim, cache: UsdGeom.XformCache, code: Usd.TimeCode) -> Iterable[Draw]:
         if not _visible(gprim.prim, code):
             return
         if gprim.matrix is None or gprim.place_varies:
@@ -374,6 +374,11 @@ def _default_light(camera: Camera) -> npt.NDArray[np.void]:
     return row
 
 
+def _sky_luminance(ambient: tuple[float, float, float]) -> tuple[float, float, float]:
+    r, g, b = (dome_luminance(lux) for lux in ambient)
+    return r, g, b
+
+
 def _visible(prim: Usd.Prim, code: Usd.TimeCode) -> bool:
     return bool(UsdGeom.Imageable(prim).ComputeVisibility(code) != UsdGeom.Tokens.invisible)
 
@@ -393,7 +398,11 @@ def _meters_per_unit(stage: Usd.Stage, report: Report) -> float:
     place = SourceRef(Path(stage.GetRootLayer().identifier))
     if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
         report.add(
-            Kind.ASSUMED, "no-units", place, "", "no metersPerUnit; USD's 0.01 (centimetres) is used"
+            Kind.ASSUMED,
+            "no-units",
+            place,
+            "",
+            "no metersPerUnit; USD's 0.01 (centimetres) is used",
         )
     if not (unit > 0.0 and np.isfinite(unit)):
         raise InputError(place, f"metersPerUnit {unit}; want a positive number")

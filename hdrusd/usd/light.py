@@ -19,7 +19,7 @@ from hdrusd.photometry.light import PhotometricLight
 from hdrusd.report import Kind, Report
 from hdrusd.scene import LIGHT, NO_CONE
 from hdrusd.units import LUMINANCE_WEIGHTS, distant_luminance, dome_luminance, sphere_luminance
-from hdrusd.usd.lux import LuxReading, read_lux
+from hdrusd.usd.lux import LuxReading, input_source, read_lux
 
 #: Full angle of a distant light that we write: the sun's and the moon's, degrees.
 DISTANT_ANGLE = 0.53
@@ -149,7 +149,9 @@ def read_light_row(
         row["outer"] = row["inner"] = math.pi / 2
         row["exponent"] = 1.0
     if reading.kind in ("disk", "rect", "cylinder"):
-        _finding(report, prim, "area-light", f"{reading.kind} shines from its centre", Kind.REPLACED)
+        _finding(
+            report, prim, "area-light", f"{reading.kind} shines from its centre", Kind.REPLACED
+        )
     _read_shaping(prim, time, row, report)
     return row
 
@@ -177,7 +179,7 @@ def _photometric(
     luminance = float(rgb @ LUMINANCE_WEIGHTS)
     color = rgb / luminance if luminance > 0.0 else np.ones(3)
     name = _ILLUMINANCE if reading.kind in ("distant", "dome") else _INTENSITY
-    attribute = prim.GetAttribute(name)
+    attribute = input_source(prim, name.removeprefix("inputs:"))
     if attribute and attribute.HasAuthoredValue():
         return float(attribute.Get(time)), color
     return luminance, color

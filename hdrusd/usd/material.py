@@ -181,9 +181,7 @@ class _Network:
         coordinates = reader
         if texture.transform is not None:
             coordinates = self._transform(name, texture.transform, reader)
-        node.CreateInput("st", types.Float2).ConnectToSource(
-            coordinates.ConnectableAPI(), "result"
-        )
+        node.CreateInput("st", types.Float2).ConnectToSource(coordinates.ConnectableAPI(), "result")
         for output, kind in (("rgb", types.Float3), *((c, types.Float) for c in "rgba")):
             node.CreateOutput(output, kind)
         return node.ConnectableAPI()

@@ -118,7 +118,9 @@ class GeometryReader:
             tri = tri.select(solid)
         finite = np.isfinite(self.points).all(axis=1)
         if not finite.all():
-            self._finding(Kind.INVALID, "mesh-not-finite", "points are not finite; their faces left")
+            self._finding(
+                Kind.INVALID, "mesh-not-finite", "points are not finite; their faces left"
+            )
             keep = finite[tri.vertex].all(axis=1)
             tri = Corners(tri.vertex[keep], tri.corner[keep], tri.face[keep])
             self.points = np.where(finite[:, None], self.points, 0.0).astype(np.float32)

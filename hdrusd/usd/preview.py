@@ -13,6 +13,7 @@ from hdrusd.errors import SourceRef
 from hdrusd.report import Kind, Report
 from hdrusd.scene import Material, TextureRef, TextureUse
 from hdrusd.usd.assets import resolved_asset
+from hdrusd.usd.lux import connection_end
 
 #: Exponent range that a roughness maps to; at 1e5 the lobe is half a degree wide.
 _MAX_SHININESS = 1e5
@@ -44,12 +45,12 @@ class MaterialReader:
     def read(self, material: UsdShade.Material, time: Usd.TimeCode) -> Material | None:
         """The material at ``time``, or None when it has no surface that we know."""
         prim = material.GetPrim()
-        shader, _, _ = material.ComputeSurfaceSource()
-        if not shader or shader.GetIdAttr().Get() != "UsdPreviewSurface":
+        shader = _surface_shader(material)
+        if shader is None or shader.GetIdAttr().Get() != "UsdPreviewSurface":
             what = shader.GetIdAttr().Get() if shader else "no surface"
             self._finding(prim, "material-unknown", f"{what}; want UsdPreviewSurface; grey is used")
             return None
-        surface = _Surface(shader, time)
+        surface = _Node(shader, time)
         self._note_unused(prim, surface)
         diffuse, diffuse_map, primvar = self._color(prim, surface, "diffuseColor", (0.18,) * 3)
         emission, emission_map, _ = self._color(prim, surface, "emissiveColor", (0.0,) * 3)
@@ -83,9 +84,7 @@ class MaterialReader:
             opacity_threshold=threshold,
         )
 
-    def _specular(
-        self, prim: Usd.Prim, surface: _Surface
-    ) -> tuple[tuple[float, float, float], float]:
+    def _specular(self, prim: Usd.Prim, surface: _Node) -> tuple[tuple[float, float, float], float]:
         if int(surface.value("useSpecularWorkflow", 0)) == 1:
             color, used, _ = self._color(prim, surface, "specularColor", (0.0,) * 3)
             if used is not None:
@@ -95,14 +94,14 @@ class MaterialReader:
         f0 = ((1.0 - ior) / (1.0 + ior)) ** 2
         return (f0, f0, f0), self._factor(prim, surface, "metallic", 0.0)
 
-    def _factor(self, prim: Usd.Prim, surface: _Surface, name: str, default: float) -> float:
+    def _factor(self, prim: Usd.Prim, surface: _Node, name: str, default: float) -> float:
         """A float input; a texture on it has no term yet and the input's own value holds."""
         if self._texture(prim, surface, name) is not None:
             self._finding(prim, f"{name}-texture", f"{name} texture is not used; {default} is")
             return default
         return float(np.clip(surface.value(name, default), 0.0, 1.0))
 
-    def _note_unused(self, prim: Usd.Prim, surface: _Surface) -> None:
+    def _note_unused(self, prim: Usd.Prim, surface: _Node) -> None:
         for name, off in _UNUSED.items():
             if surface.connected(name) or abs(float(surface.value(name, off)) - off) > 1e-6:
                 self._finding(prim, f"{name}-unused", f"{name} is not shown")
@@ -110,7 +109,7 @@ class MaterialReader:
             self._finding(prim, "normal-map-unused", "normal map is not shown")
 
     def _color(
-        self, prim: Usd.Prim, surface: _Surface, name: str, default: tuple[float, ...]
+        self, prim: Usd.Prim, surface: _Node, name: str, default: tuple[float, ...]
     ) -> tuple[tuple[float, float, float], TextureUse | None, str]:
         """A colour input as (constant, texture, primvar that gives it)."""
         source = surface.source(name)
@@ -125,7 +124,7 @@ class MaterialReader:
             r, g, b = (max(v, 0.0) if math.isfinite(v) else 0.0 for v in (r, g, b))
         return (r, g, b), self._texture(prim, surface, name), ""
 
-    def _texture(self, prim: Usd.Prim, surface: _Surface, name: str) -> TextureUse | None:
+    def _texture(self, prim: Usd.Prim, surface: _Node, name: str) -> TextureUse | None:
         source = surface.source(name)
         if source is None:
             return None
@@ -182,9 +181,7 @@ class MaterialReader:
             node = inner.source("in")
         return "st", tuple(float(v) for v in matrix[:2].ravel())
 
-    def _finding(
-        self, prim: Usd.Prim, code: str, text: str, kind: Kind = Kind.DROPPED
-    ) -> None:
+    def _finding(self, prim: Usd.Prim, code: str, text: str, kind: Kind = Kind.DROPPED) -> None:
         self.report.add(kind, code, self.place, str(prim.GetPath()), text)
 
 
@@ -197,6 +194,16 @@ def transform_2d(scale: Any, rotation: float, translation: Any) -> np.ndarray:  
     return np.asarray(matrix)
 
 
+def _surface_shader(material: UsdShade.Material) -> UsdShade.Shader | None:
+    """The node behind the surface output of the universal render context."""
+    output = material.GetSurfaceOutput()
+    if not output:
+        return None
+    end = connection_end(output.GetAttr())
+    shader = UsdShade.Shader(end.GetPrim())
+    return shader if shader and end != output.GetAttr() else None
+
+
 class _Node:
     """A shader node at a time: values and sources through interfaces and node graphs."""
 
@@ -206,25 +213,22 @@ class _Node:
 
     def producer(self, name: str) -> Usd.Attribute | None:
         """The attribute whose value reaches input ``name``."""
-        port = self.shader.GetInput(name)
-        if not port:
-            return None
-        attributes = UsdShade.Utils.GetValueProducingAttributes(port)
-        return attributes[0] if attributes else None
+        own = self.shader.GetPrim().GetAttribute(f"inputs:{name}")
+        return connection_end(own) if own else None
 
     def value(self, name: str, default: Any) -> Any:
         attribute = self.producer(name)
-        if attribute is None or UsdShade.Utils.GetType(attribute.GetName()) == _OUTPUT:
-            port = self.shader.GetInput(name)  # connected to a node: its own value, if any
-            value = port.GetAttr().Get(self.time) if port else None
-        else:
-            value = attribute.Get(self.time)
+        if attribute is None:
+            return default
+        if UsdShade.Output.IsOutput(attribute):  # connected to a node: its own value, if any
+            attribute = self.shader.GetPrim().GetAttribute(f"inputs:{name}")
+        value = attribute.Get(self.time)
         return default if value is None else value
 
     def source(self, name: str) -> UsdShade.Shader | None:
         """The node that feeds input ``name``, or None for a constant."""
         attribute = self.producer(name)
-        if attribute is None or UsdShade.Utils.GetType(attribute.GetName()) != _OUTPUT:
+        if attribute is None or not UsdShade.Output.IsOutput(attribute):
             return None
         shader = UsdShade.Shader(attribute.GetPrim())
         return shader if shader else None
@@ -232,17 +236,10 @@ class _Node:
     def output(self, name: str) -> str:
         """Which output of that node: "rgb", "a"."""
         attribute = self.producer(name)
-        return attribute.GetBaseName() if attribute is not None else ""
+        return str(attribute.GetBaseName()) if attribute is not None else ""
 
     def connected(self, name: str) -> bool:
         return self.source(name) is not None
-
-
-class _Surface(_Node):
-    """The UsdPreviewSurface node."""
-
-
-_OUTPUT = UsdShade.AttributeType.Output
 
 
 class _Photometric:
@@ -269,5 +266,3 @@ def _wrap(mode: Any) -> str:
 def _four(values: Any) -> tuple[float, float, float, float]:
     a, b, c, d = (float(v) for v in (Gf.Vec4f(*values)))
     return a, b, c, d
-
-

@@ -66,7 +66,7 @@ def read_settings(stage: Usd.Stage, path: str | None = None) -> Settings:
         if not prim or not prim.IsA(UsdRender.Settings):
             raise InputError(
                 Path(stage.GetRootLayer().identifier),
-                f"{path}: no RenderSettings; see --renderSettingsPrimPath"
+                f"{path}: no RenderSettings; see --renderSettingsPrimPath",
             )
     if not prim:
         return Settings()
@@ -91,4 +91,3 @@ def read_settings(stage: Usd.Stage, path: str | None = None) -> Settings:
         peak=number("hdrusd:display:peak"),
         black=number("hdrusd:display:black"),
     )
-

@@ -1,9 +1,9 @@
 """The one writer: a LegacyScene, walked once, into layers.
 
-    street.usda              units, default prim; sublayers, strongest first:
-    street.photometry.usda   lights, reflectance, cd/m2, our schema
-    street.look.usda         the look as it was
-    street.geometry.usdc     nodes, meshes, cameras, bindings, animation
+street.usda              units, default prim; sublayers, strongest first:
+street.photometry.usda   lights, reflectance, cd/m2, our schema
+street.look.usda         the look as it was
+street.geometry.usdc     nodes, meshes, cameras, bindings, animation
 """
 
 from __future__ import annotations
@@ -220,9 +220,7 @@ class StageWriter:
 
     # -- looks and photometry --------------------------------------------------------------
 
-    def edit_materials(
-        self, layer: str, write: Callable[[Usd.Stage, int, Sdf.Path], None]
-    ) -> None:
+    def edit_materials(self, layer: str, write: Callable[[Usd.Stage, int, Sdf.Path], None]) -> None:
         """Call ``write(stage, index, path)`` for each material, into one layer."""
         self._edit(layer)
         for index, path in enumerate(self.materials):

@@ -17,7 +17,7 @@ GLASS = (0.60, 0.20)  # m, along and across the head: 0.12 m2 seen from below
 LANTERN_HEIGHT = 4.15  # m above the arcade's floor
 
 LUMINAIRE = Light(
-    "LuminaireLamp", "spot", SODIUM, cutoff=72.0, exponent=1.0, attenuation=(0.5, 0.05, 0.01)
+    "LuminaireLamp", "spot", SODIUM, cutoff=75.0, exponent=1.0, attenuation=(0.5, 0.05, 0.01)
 )
 LANTERN = Light("ArcadeLamp", "point", WARM_WHITE, attenuation=(0.5, 0.1, 0.05))
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
+from hypothesis import HealthCheck, settings
+
 from hdrusd.importers.importer import Limits, Resolver
 from hdrusd.importers.obj import read
 from hdrusd.legacy.scene import LegacyScene, Material, Mesh
@@ -24,6 +26,14 @@ vn 0 0 1
 """
 
 
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+
+#: For hypothesis: files are written, so an example takes its time.
+quick = settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+
+
 class Loaded(NamedTuple):
     """A scene and what was said about it."""
 
@@ -35,6 +45,11 @@ class Loaded(NamedTuple):
         """The only mesh."""
         (mesh,) = self.scene.meshes
         return mesh
+
+    @property
+    def corner_points(self) -> list[list[float]]:
+        """Where the corners of the only mesh are, face by face."""
+        return self.mesh.points[self.mesh.face_indices].tolist()
 
     @property
     def material(self) -> Material:

@@ -119,6 +119,24 @@ def test_a_buffer_without_bytes_is_an_error(tmp_path: Path, uri: str) -> None:
         load(path)
 
 
+def test_the_declared_length_of_a_buffer_is_held_against_its_bytes(tmp_path: Path) -> None:
+    doc = only_triangle(tmp_path)
+    path = tmp_path / "scene.gltf"
+    (tmp_path / "b.bin").write_bytes(doc.body)
+
+    def declare(length: int) -> str:
+        buffers = [{"byteLength": length, "uri": "b.bin"}]
+        return "\ufeff" + json.dumps({**doc.json, "buffers": buffers})  # with a byte order mark
+
+    path.write_text(declare(37), encoding="utf-8")
+    scene, report = load(path)
+    assert scene.counts()["triangles"] == 1
+    assert report.codes() == {"buffer-size"}
+    path.write_text(declare(35), encoding="utf-8")
+    with pytest.raises(InputError, match="reach to byte 36"):
+        load(path)
+
+
 def test_interleaved_vertices_are_read_by_stride(tmp_path: Path) -> None:
     doc = Doc()
     both = np.hstack([SQUARE, -SQUARE]).astype("<f4")
@@ -185,7 +203,7 @@ def test_sparse_accessors_replace_elements(tmp_path: Path, with_base: bool) -> N
         {"count": 4},
         {"count": 4_000_000_000},
         {"count": 10**30},
-        {"byteOffset": 4},
+        {"byteOffset": 1},
         {"bufferView": 9},
         {"componentType": 5124},
         {"type": "MAT4"},
@@ -311,3 +329,8 @@ def test_shared_accessors_cannot_multiply_past_the_limit(tmp_path: Path) -> None
     assert len(load_doc(tmp_path, doc, limits=Limits(vertices=300))[0].meshes) == 100
     with pytest.raises(InputError, match="more than 299 vertices"):
         load_doc(tmp_path, doc, limits=Limits(vertices=299))
+    doc = Doc()
+    doc.mesh([0, 1, 2] * 100, POSITION=doc.add(TRIANGLE))
+    assert load_doc(tmp_path, doc, limits=Limits(vertices=50))[0].counts()["triangles"] == 100
+    with pytest.raises(InputError, match="or 98 triangles"):
+        load_doc(tmp_path, doc, limits=Limits(vertices=49))

@@ -36,9 +36,9 @@ def test_a_matrix_is_read_for_row_vectors(tmp_path: Path) -> None:
 
 
 def test_translation_rotation_and_scale_are_kept_apart(tmp_path: Path) -> None:
-    node = {"translation": [1, 2, 3], "rotation": [0, 0, 2, 0], "scale": [1, 1, 0]}
+    node = {"translation": [1, 2, 3], "rotation": [0, 3, 0, 4], "scale": [1, 1, 0]}
     scene, report = load_json(tmp_path, nodes=[node, {"rotation": [0, 0, 0, 0]}])
-    assert scene.roots[0].transform == TRS((1.0, 2.0, 3.0), (0.0, 0.0, 1.0, 0.0), (1.0, 1.0, 0.0))
+    assert scene.roots[0].transform == TRS((1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8), (1.0, 1.0, 0.0))
     assert scene.roots[1].transform == TRS()
     assert report.codes() >= {"node-rotation", "node-singular"}
 
@@ -228,6 +228,7 @@ def test_a_cubic_spline_is_resampled_onto_its_curve(tmp_path: Path) -> None:
     triples = np.zeros((3, 3, 3))
     triples[:, 0, 0] = triples[:, 2, 0] = 3.0 * keys**2
     triples[:, 1, 0] = keys**3
+    triples[0, 0] = triples[2, 2] = 999.0  # slopes before the first and after the last key
     doc = Doc(nodes=[{}])
     animated(doc, "translation", keys, triples.reshape(9, 3), "CUBICSPLINE")
     scene, report = load_doc(tmp_path, doc)

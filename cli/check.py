@@ -1,0 +1,38 @@
+"""``hdrusd check``."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+import click
+
+from hdrusd.errors import ValidationError
+
+from .options import FILE, STRICT
+
+
+@click.command("check")
+@click.argument("stage", type=FILE)
+@click.option("--json", "as_json", is_flag=True, help="Print the problems as JSON.")
+@click.option("--strict", is_flag=True, help=f"Exit with {STRICT} on warnings too.")
+def command(stage: Path, as_json: bool, strict: bool) -> None:
+    """Validate STAGE: units, light intensities, reflectances, sky."""
+    from hdrusd.render import open_stage
+    from hdrusd.validation import validate
+
+    problems = validate(open_stage(stage))
+    if as_json:
+        click.echo(json.dumps([asdict(problem) for problem in problems]))
+    else:
+        for problem in problems:
+            click.echo(f"{stage.name}: {problem.severity}: {problem}")
+    errors = sum(problem.severity == "error" for problem in problems)
+    if not as_json:
+        click.echo(f"{stage.name}: {errors} errors, {len(problems) - errors} warnings", err=True)
+    if errors:
+        sys.exit(ValidationError.exit_code)
+    if strict and problems:
+        sys.exit(STRICT)

@@ -1,0 +1,106 @@
+"""``hdrusd convert``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from .options import FILE, FOLDER, finish, report_options, tell, write_report
+
+
+@click.command("convert")
+@click.argument("source", type=FILE)
+@click.argument("output", type=FILE)
+@click.option("--photometry", type=FILE, help="Photometry file. [default: photometry.toml beside]")
+@click.option(
+    "--estimate",
+    metavar="RULE",
+    default="night-20lx",
+    show_default=True,
+    help="Rule for lights and emission without a unit: night-20lx, interior-100lx, day-10000lx.",
+)
+@click.option(
+    "--gamma",
+    type=click.FloatRange(0.1, 10.0),
+    help="R = T^gamma * D. [default: the photometry file's, else 2.2]",
+)
+@click.option(
+    "--meters-per-unit",
+    "--metersPerUnit",
+    type=click.FloatRange(1e-9, 1e9),
+    default=1.0,
+    show_default=True,
+    help="Unit of the stage.",
+)
+@click.option(
+    "--source-unit",
+    type=click.FloatRange(1e-9, 1e9),
+    metavar="METERS",
+    help="Metres a source unit, where the format does not say or is wrong.",
+)
+@click.option("--up", type=click.Choice(["Y", "Z"]), help="Up axis, likewise.")
+@click.option(
+    "--root",
+    "roots",
+    type=FOLDER,
+    multiple=True,
+    help="Folder below which the source may name files; its own always counts.",
+)
+@click.option(
+    "--search-path",
+    "search",
+    type=FOLDER,
+    multiple=True,
+    help="Folder where missing textures are looked for.",
+)
+@report_options
+def command(
+    source: Path,
+    output: Path,
+    photometry: Path | None,
+    estimate: str,
+    gamma: float | None,
+    meters_per_unit: float,
+    source_unit: float | None,
+    up: str | None,
+    roots: tuple[Path, ...],
+    search: tuple[Path, ...],
+    report_file: Path | None,
+    strict: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Turn SOURCE (.gltf .glb .obj .osg .osgt) into a photometric stage OUTPUT.usda.
+
+    Beside OUTPUT stand its layers (geometry, look, photometry) and textures.
+    """
+    from hdrusd.convert import Options, convert
+    from hdrusd.report import Report
+
+    report = Report()
+    options = Options(
+        photometry=photometry,
+        estimate=estimate,
+        gamma=gamma,
+        meters_per_unit=meters_per_unit,
+        source_unit=source_unit,
+        up=up,
+        roots=roots,
+        search=search,
+    )
+    result = convert(source, output, options, report)
+    document = result.as_dict()
+    if report_file is not None:
+        write_report(report_file, document)
+    tell(report, quiet)
+    if as_json:
+        click.echo(json.dumps(document))
+    else:
+        counts = result.counts
+        click.echo(
+            f"{output}: {counts['triangles']} triangles, {counts['materials']} materials, "
+            f"{len(result.textures)} textures, {len(result.lights)} lights"
+        )
+    finish(report, strict)

@@ -1,0 +1,99 @@
+"""The ``hdrusd`` group: commands imported when named, errors as one line and an exit code."""
+
+from __future__ import annotations
+
+import os
+import sys
+from importlib import import_module
+from importlib.metadata import entry_points
+
+import click
+
+from hdrusd import __version__
+from hdrusd.errors import HdrusdError
+
+#: Name, module beside this file, and the help's one line: read without importing the module.
+COMMANDS = {
+    "convert": "Turn a legacy database into a photometric USD stage.",
+    "render": "Render a stage: frames in cd/m2 (EXR) and tone-mapped (PNG).",
+    "tonemap": "Tone map frames in cd/m2.",
+    "check": "Run the photometric validators on a stage.",
+    "info": "Say what a database, a stage or a frame holds.",
+    "operators": "List the tone mapping operators, or explain one.",
+    "schemas": "Print the folder of the USD schemas, for PXR_PLUGINPATH_NAME.",
+    "doctor": "Say which device, versions and missing pieces there are.",
+}
+
+
+class Commands(click.Group):
+    """A group whose commands live in a module each; other packages may add some."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Built-in commands in their order, then those of plug-ins."""
+        return [*COMMANDS, *sorted(e.name for e in entry_points(group="hdrusd.commands"))]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a command's module."""
+        if cmd_name in COMMANDS:
+            module = import_module(f".{cmd_name}", __package__)
+            command: click.Command = module.command
+            return command
+        for entry in entry_points(group="hdrusd.commands", name=cmd_name):
+            loaded: click.Command = entry.load()
+            return loaded
+        return None
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The list in ``--help``, from the table alone: importing everything takes a second."""
+        rows = [(name, COMMANDS.get(name, "(plug-in)")) for name in self.list_commands(ctx)]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Say what the nearest command is when a name is wrong."""
+        try:
+            return super().resolve_command(ctx, args)
+        except click.UsageError as error:
+            from difflib import get_close_matches
+
+            near = get_close_matches(args[0], self.list_commands(ctx), n=1) if args else []
+            if near:
+                error.message += f" Did you mean {near[0]!r}?"
+            raise
+
+
+@click.group(
+    cls=Commands,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="Exit codes: 0 done, 1 error, 2 wrong use, 3 input unreadable, 4 validation failed, "
+    "5 no OpenGL, 6 findings under --strict, 130 interrupted.",
+)
+@click.version_option(__version__, prog_name="hdrusd")
+def hdrusd() -> None:
+    """Photometric night rendering of LDR 3D databases on OpenUSD."""
+
+
+def main() -> None:
+    """Entry point: run, and turn what goes wrong into one line and an exit code."""
+    try:
+        code = hdrusd.main(prog_name="hdrusd", standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        code = error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted", err=True)
+        code = 130
+    except HdrusdError as error:
+        click.echo(str(error), err=True)
+        code = error.exit_code
+    except BrokenPipeError:
+        # The reader went away (| head): nothing to say, and nothing to say it to.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 141
+    except OSError as error:
+        click.echo(f"{error.filename or 'file'}: {error.strerror or error}", err=True)
+        code = 1
+    sys.stdout.flush()
+    sys.exit(code if isinstance(code, int) else 0)

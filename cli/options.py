@@ -1,0 +1,101 @@
+"""Options that more than one command has, and how findings are told."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from hdrusd.errors import HdrusdError
+from hdrusd.report import Report
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+#: Exit code of a run with findings under --strict.
+STRICT = 6
+
+#: Findings told on the terminal; the rest is in the report.
+_SHOWN = 20
+
+FILE = click.Path(path_type=Path, dir_okay=False)
+FOLDER = click.Path(path_type=Path, file_okay=False, exists=True)
+
+
+def report_options(function: F) -> F:
+    """--report, --strict, --json, --quiet."""
+    for option in (
+        click.option("--report", "report_file", type=FILE, help="Write all findings as JSON."),
+        click.option("--strict", is_flag=True, help=f"Exit with {STRICT} when there are findings."),
+        click.option(
+            "--json", "as_json", is_flag=True, help="Print the result as one JSON object."
+        ),
+        click.option("-q", "--quiet", is_flag=True, help="No findings on the terminal."),
+    ):
+        function = option(function)
+    return function
+
+
+def operator_options(function: F) -> F:
+    """--operator and --set name=value for its parameters."""
+    for option in (
+        click.option(
+            "--set",
+            "settings",
+            metavar="NAME=VALUE",
+            multiple=True,
+            help="Parameter of the operator; repeatable. See: hdrusd operators NAME.",
+        ),
+        click.option(
+            "--operator", "-op", metavar="NAME", help="Tone mapping operator. [default: reinhard02]"
+        ),
+    ):
+        function = option(function)
+    return function
+
+
+def parse_settings(settings: tuple[str, ...]) -> dict[str, Any]:
+    """``name=value`` pairs; numbers become floats, "none" becomes None. Raises UsageError."""
+    parsed: dict[str, Any] = {}
+    for setting in settings:
+        name, equals, text = setting.partition("=")
+        if not equals or not name:
+            raise click.UsageError(f"--set {setting}: want NAME=VALUE")
+        try:
+            parsed[name] = float(text)
+        except ValueError:
+            parsed[name] = None if text == "none" else text
+    return parsed
+
+
+def tell(report: Report, quiet: bool) -> None:
+    """Findings to standard error: guesses and losses first, a line each, the count last."""
+    if quiet or not len(report):
+        return
+    order = ["missing", "invalid", "clamped", "guessed", "dropped", "replaced", "assumed"]
+    findings = sorted(report, key=lambda finding: order.index(str(finding.kind)))
+    for finding in findings[:_SHOWN]:
+        click.echo(f"{finding.kind}: {finding}", err=True)
+    if len(findings) > _SHOWN:
+        click.echo(f"... and {len(findings) - _SHOWN} more; --report FILE has them all", err=True)
+    click.echo(report.summary(), err=True)
+
+
+def write_report(path: Path, document: dict[str, Any]) -> None:
+    """Write JSON under a temporary name, then rename."""
+    if path.exists() and not path.is_file():
+        raise HdrusdError(f"{path}: not a regular file; see --report")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    temporary.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    temporary.replace(path)
+
+
+def finish(report: Report, strict: bool) -> None:
+    """Exit with STRICT where findings are not wanted."""
+    if strict and len(report):
+        sys.exit(STRICT)

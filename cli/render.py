@@ -1,0 +1,193 @@
+"""``hdrusd render``."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+
+from hdrusd.frames import check_pattern, parse_frames
+
+from .options import (
+    FILE,
+    finish,
+    operator_options,
+    parse_settings,
+    report_options,
+    tell,
+    write_report,
+)
+
+
+@click.command("render")
+@click.argument("stage", type=FILE)
+@click.argument("output", type=str)
+@click.option(
+    "--frames",
+    "-f",
+    metavar="FRAMESPEC[,FRAMESPEC]",
+    help="Time codes: 101, 101:105, 105:101, 101:109x2, 101:104x0.5. OUTPUT then holds "
+    "#### or ###.###. [default: the stage's start]",
+)
+@click.option(
+    "--default-time",
+    "--defaultTime",
+    "-d",
+    is_flag=True,
+    help="Render the default time, where nothing is animated.",
+)
+@click.option(
+    "--camera",
+    "-cam",
+    metavar="PRIM",
+    help="Camera by path or name. "
+    "[default: the render settings', else the first, else one that frames the stage]",
+)
+@click.option(
+    "--image-width",
+    "--imageWidth",
+    "-w",
+    type=click.IntRange(1, 16384),
+    help="Pixels. [default: the render settings' resolution, else 960]",
+)
+@click.option(
+    "--image-height",
+    "--imageHeight",
+    type=click.IntRange(1, 16384),
+    help="Pixels. [default: by the aspect ratio]",
+)
+@click.option("--png", metavar="PATTERN", help="Write tone-mapped pictures too.")
+@click.option(
+    "--reflection",
+    type=click.Choice(["lambert", "petit2010"]),
+    default="lambert",
+    show_default=True,
+    help="L = R E / pi, or the paper's L = R E.",
+)
+@click.option(
+    "--gamma",
+    type=click.FloatRange(0.1, 10.0),
+    default=2.2,
+    show_default=True,
+    help="Exponent that decodes 8-bit textures marked sRGB.",
+)
+@click.option(
+    "--purposes",
+    metavar="LIST",
+    default="render",
+    show_default=True,
+    help="Purposes drawn beside default: render, proxy, guide.",
+)
+@click.option("--mask", metavar="PRIMPATH[,...]", help="Open only these prims.")
+@click.option("--session-layer", "--sessionLayer", type=FILE, help="Layer over the stage.")
+@click.option(
+    "--render-settings-prim-path",
+    "--renderSettingsPrimPath",
+    "-rs",
+    metavar="PRIM",
+    help="RenderSettings to use. [default: the stage's]",
+)
+@click.option(
+    "--disable-camera-light",
+    "--disableCameraLight",
+    is_flag=True,
+    help="Leave a stage without light dark.",
+)
+@click.option(
+    "--enable-dome-light-visibility",
+    "--enableDomeLightVisibility",
+    is_flag=True,
+    help="Show the sky behind the scene.",
+)
+@click.option("--half", is_flag=True, help="Half floats in the EXR; above 65504 they clip.")
+@click.option("--resume", is_flag=True, help="Skip frames whose files are there.")
+@operator_options
+@report_options
+def command(stage: Path, output: str, **options: Any) -> None:
+    """Render STAGE into OUTPUT: .exr for cd/m2, .png for the tone-mapped picture.
+
+    Works on any UsdLux stage. Headless; a software device will do.
+    """
+    from hdrusd.gpu.context import create_context
+    from hdrusd.render import render_sequence
+    from hdrusd.report import Report
+
+    report = Report()
+    job = _job(stage, output, options)
+    started, written, skipped = time.perf_counter(), [], 0
+    total = len(job.times) if job.times is not None else 1
+    with click.progressbar(
+        length=total, label=stage.name, file=sys.stderr, hidden=not sys.stderr.isatty()
+    ) as bar:
+        for frame in render_sequence(create_context(), job, report):
+            written += [str(file) for file in frame.files if not frame.skipped]
+            skipped += frame.skipped
+            bar.update(1)
+    document = report.as_dict() | {
+        "files": written,
+        "frames": total,
+        "skipped": skipped,
+        "seconds": round(time.perf_counter() - started, 3),
+    }
+    if options["report_file"] is not None:
+        write_report(options["report_file"], document)
+    tell(report, options["quiet"])
+    if options["as_json"]:
+        click.echo(json.dumps(document))
+    else:
+        for file in written:
+            click.echo(file)
+    finish(report, options["strict"])
+
+
+def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
+    """The options as a Job. Raises UsageError for what does not go together."""
+    from hdrusd.render import Job
+    from hdrusd.tonemap.operator import OPERATORS
+
+    suffix = Path(output).suffix.lower()
+    if suffix not in (".exr", ".png"):
+        raise click.UsageError(f"{output}: want a name that ends in .exr or .png")
+    exr, png = (output, options["png"]) if suffix == ".exr" else (None, output)
+    if suffix == ".png" and options["png"]:
+        raise click.UsageError("--png: OUTPUT is a PNG already; want OUTPUT.exr beside it")
+    if png is not None and Path(png).suffix.lower() != ".png":
+        raise click.UsageError(f"--png {png}: want a name that ends in .png")
+    if options["frames"] and options["default_time"]:
+        raise click.UsageError("--frames and --defaultTime exclude one another")
+    times = parse_frames(options["frames"]) if options["frames"] else None
+    for pattern in (exr, png):
+        if pattern is not None:
+            check_pattern(pattern, times)
+    operator = None
+    settings = parse_settings(options["settings"])
+    if png is not None:
+        operator = OPERATORS[options["operator"] or "reinhard02"]
+        operator.settings(settings)
+    elif options["operator"] or settings:
+        raise click.UsageError("--operator: nothing is tone mapped; want --png or OUTPUT.png")
+    return Job(
+        stage=stage,
+        times=[float("nan")] if options["default_time"] else times,
+        exr=exr,
+        png=png,
+        camera=options["camera"],
+        width=options["image_width"],
+        height=options["image_height"],
+        operator=operator,
+        parameters=settings,
+        reflection=options["reflection"],
+        gamma=options["gamma"],
+        purposes=[p for p in options["purposes"].replace(",", " ").split() if p],
+        mask=[p for p in (options["mask"] or "").replace(",", " ").split() if p],
+        session_layer=options["session_layer"],
+        settings=options["render_settings_prim_path"],
+        default_sky=not options["disable_camera_light"],
+        sky_visible=options["enable_dome_light_visibility"],
+        half=options["half"],
+        resume=options["resume"],
+    )

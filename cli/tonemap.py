@@ -1,0 +1,73 @@
+"""``hdrusd tonemap``."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import click
+
+from hdrusd.errors import HdrusdError, InputError
+from hdrusd.frames import check_pattern, find_frames, frame_path, has_placeholder, parse_frames
+
+from .options import operator_options, parse_settings
+
+
+@click.command("tonemap")
+@click.argument("source", type=str)
+@click.argument("output", type=str)
+@click.option(
+    "--frames",
+    "-f",
+    metavar="FRAMESPEC[,FRAMESPEC]",
+    help="Frames of a numbered sequence. [default: all that exist]",
+)
+@click.option("--reference", is_flag=True, help="On the CPU, by the NumPy definition.")
+@click.option("--resume", is_flag=True, help="Skip pictures that are there.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+@operator_options
+def command(
+    source: str,
+    output: str,
+    frames: str | None,
+    reference: bool,
+    resume: bool,
+    as_json: bool,
+    operator: str | None,
+    settings: tuple[str, ...],
+) -> None:
+    """Tone map SOURCE (.exr, 1.0 = 1 cd/m2) into OUTPUT (.png); both may hold ####."""
+    if Path(output).suffix.lower() != ".png":
+        raise click.UsageError(f"{output}: want a name that ends in .png")
+    if frames:
+        times = parse_frames(frames)
+        pairs = [(time, frame_path(source, time)) for time in times]
+    else:
+        pairs = find_frames(source)
+    if not pairs:
+        raise InputError(Path(source), "no such frames")
+    check_pattern(output, [time for time, _ in pairs] if has_placeholder(source) else None)
+    if frames and not has_placeholder(source):
+        raise HdrusdError(f"{source}: no frame placeholder; want one, as in in.####.exr")
+
+    from hdrusd.display import tonemap_sequence
+    from hdrusd.tonemap.operator import OPERATORS
+
+    chosen = OPERATORS[operator or "reinhard02"]
+    parameters = parse_settings(settings)
+    chosen.settings(parameters)
+    jobs = [(file, frame_path(output, time)) for time, file in pairs]
+    written = []
+    with click.progressbar(
+        length=len(jobs), label=chosen.name, file=sys.stderr, hidden=not sys.stderr.isatty()
+    ) as bar:
+        for file in tonemap_sequence(jobs, chosen, parameters, reference=reference, resume=resume):
+            if file is not None:
+                written.append(str(file))
+            bar.update(1)
+    if as_json:
+        click.echo(json.dumps({"files": written, "frames": len(jobs)}))
+    else:
+        for name in written:
+            click.echo(name)

@@ -1,0 +1,132 @@
+"""The second half alone: frames in cd/m2 become pictures for a display."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from hdrusd.colour import dither, quantise, srgb_encode
+from hdrusd.gpu.context import create_context
+from hdrusd.gpu.ldr import ToneMapper
+from hdrusd.gpu.measure import Measurer
+from hdrusd.gpu.program import Programs
+from hdrusd.images import read_exr, write_png
+from hdrusd.tonemap.falsecolour import OPERATOR as FALSE_COLOUR
+from hdrusd.tonemap.legend import SMALLEST, paint_legend
+from hdrusd.tonemap.operator import Operator, Parameters, Statistics
+
+
+class Display:
+    """Shader 2 with its measurements: an HDR texture becomes a picture."""
+
+    def __init__(self, ctx: moderngl.Context, programs: Programs, operator: Operator) -> None:
+        self.operator = operator
+        self.mapper = ToneMapper(ctx, programs)
+        self.measurer = Measurer(ctx, programs)
+
+    def show(
+        self, hdr: moderngl.Texture, parameters: Parameters, *, top_first: bool = False
+    ) -> tuple[npt.NDArray[np.uint8], Statistics | None]:
+        """The picture, (h, w, 3) sRGB, top row first, and what was measured for it."""
+        settings = self.operator.settings(parameters)
+        statistics = self.measurer.measure(hdr, self.operator.needs(settings))
+        picture = self.mapper.apply(hdr, self.operator, settings, statistics, top_first=top_first)
+        add_legend(picture, self.operator, settings)
+        return picture, statistics
+
+
+def add_legend(picture: npt.NDArray[np.uint8], operator: Operator, settings: Parameters) -> None:
+    """The cd/m2 scale on a false colour picture that has room for it, in place."""
+    room = all(have >= need for have, need in zip(picture.shape, SMALLEST, strict=False))
+    if operator.name == FALSE_COLOUR.name and room:
+        paint_legend(picture, float(settings["scale"] or 0), float(settings["decades"] or 0))
+
+
+def encode(linear: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
+    """Display-linear [0, 1], (h, w, 3), as dithered 8-bit sRGB: what shader 2 does last."""
+    rows, columns = np.mgrid[0 : linear.shape[0], 0 : linear.shape[1]]
+    return np.asarray(quantise(srgb_encode(linear), dither(columns, rows)), np.uint8)
+
+
+def tonemap_sequence(
+    jobs: Sequence[tuple[Path, Path]],
+    operator: Operator,
+    parameters: Parameters,
+    *,
+    reference: bool = False,
+    resume: bool = False,
+) -> Iterator[Path | None]:
+    """Tone map EXR files into PNG files, in order; None for one that ``resume`` skipped.
+
+    ``reference``: by the NumPy definition instead of the GPU. Raises InputError,
+    ContextError.
+    """
+    display: Display | None = None
+    with Writer() as writer:
+        for source, target in jobs:
+            if resume and target.is_file():
+                yield None
+                continue
+            rgb, _ = read_exr(source)
+            if reference:
+                settings = operator.settings(parameters)
+                picture = encode(operator.apply(rgb, None, settings))
+                add_legend(picture, operator, settings)
+            else:
+                if display is None:
+                    ctx = create_context()
+                    display = Display(ctx, Programs(ctx), operator)
+                texture = display.mapper.upload(rgb)
+                picture, _ = display.show(texture, parameters, top_first=True)
+            writer.submit(write_png, target, picture)
+            yield target
+
+
+class Writer:
+    """One thread that writes files while the caller goes on; two wait at most.
+
+    A failure comes out of the next ``submit`` or of leaving the block. Leaving it
+    by an exception (Ctrl-C) finishes the files in hand, so none is torn.
+    """
+
+    def __init__(self) -> None:
+        self._queue: queue.Queue[Callable[[], None] | None] = queue.Queue(maxsize=2)
+        self._failure: BaseException | None = None
+        self._thread = threading.Thread(target=self._work, name="hdrusd-writer")
+
+    def __enter__(self) -> Writer:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._queue.put(None)
+        self._thread.join()
+        if error is None and self._failure is not None:
+            raise self._failure
+
+    def submit(self, write: Callable[..., None], *args: Any, **options: Any) -> None:
+        """Have ``write(*args, **options)`` called; waits while two others are waiting."""
+        if self._failure is not None:
+            raise self._failure
+        self._queue.put(lambda: write(*args, **options))
+
+    def _work(self) -> None:
+        while (task := self._queue.get()) is not None:
+            if self._failure is None:
+                try:
+                    task()
+                except BaseException as failure:  # handed to the caller's thread
+                    self._failure = failure

@@ -1,0 +1,208 @@
+"""Lights and light points of an OpenSceneGraph file.
+
+What a file leaves out: .osg is written in full, so the values of osg::Light's
+constructor stand in. The writer of .osgt leaves out a value that equals its
+serializer's default, which for the colours is 0 0 0 0 and for the rest
+OpenGL's default, so that is what is read; the fields are listed in
+``extras["defaults"]``. (osgconv reads the constructor's 0.05, 0.8, 0.05 there, and
+so changes a light that it wrote itself.)
+
+Sources: OpenSceneGraph 3.6, src/osgWrappers/serializers/osg/Light.cpp, LightSource.cpp,
+src/osgWrappers/serializers/osgSim/LightPointNode.cpp, src/osg/Light.cpp.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Literal
+
+from hdrusd.importers.osg_state import RenderState
+from hdrusd.importers.osg_text import Document, Statement
+from hdrusd.legacy.scene import RGB, Light, Vec3
+from hdrusd.report import Kind
+
+#: Field names in both formats, folded, to the values of osg::Light's constructor.
+_DEFAULTS: dict[str, tuple[float, ...]] = {
+    "ambient": (0.05, 0.05, 0.05, 1.0),
+    "diffuse": (0.8, 0.8, 0.8, 1.0),
+    "specular": (0.05, 0.05, 0.05, 1.0),
+    "position": (0.0, 0.0, 1.0, 0.0),
+    "direction": (0.0, 0.0, -1.0),
+    "constantattenuation": (1.0,),
+    "linearattenuation": (0.0,),
+    "quadraticattenuation": (0.0,),
+    "spotexponent": (0.0,),
+    "spotcutoff": (180.0,),
+}
+_COLOURS = ("ambient", "diffuse", "specular")
+_NO_SPOT = 180.0
+
+
+class LightReader:
+    """Reads the lights of one file into ``lights``; a shared light has one record."""
+
+    def __init__(self, document: Document, lights: list[Light]) -> None:
+        self.document = document
+        self.lights = lights
+        self._known: dict[tuple[int, bool], int] = {}
+        self._numbers: dict[int, int] = {}
+
+    def read(self, source: Statement, name: str, state: RenderState) -> int | None:
+        """The number of a LightSource's light; None, with a finding, where it has none."""
+        place = self.document.object(source, "light")
+        if place is None:
+            text = "light source without a light"
+            self.document.add(Kind.MISSING, "osg-light", source, name, text)
+            return None
+        number = int(self.document.number(place, 0.0, "lightnum"))
+        enabled = state.mode(f"GL_LIGHT{number}") is not False
+        key = id(place), enabled
+        if key not in self._known:
+            self._known[key] = len(self.lights)
+            self.lights.append(self._light(place, name, number, enabled))
+            self._shared_number(place, number)
+        return self._known[key]
+
+    def _light(self, place: Statement, name: str, number: int, enabled: bool) -> Light:
+        document = self.document
+        name = document.name(place) or name or f"light_{len(self.lights)}"
+        values: dict[str, tuple[float, ...]] = {}
+        left_out = []
+        for key, default in _DEFAULTS.items():
+            found = document.numbers(place, len(default), key)
+            if found is None:
+                left_out.append(key)
+                found = (0.0,) * 4 if document.new and key in _COLOURS else default
+            values[key] = found
+        missing = [key for key in _COLOURS if key in left_out]
+        if missing:
+            text = f"{', '.join(missing)} left out; read as {_listed(values[missing[0]])}"
+            document.add(Kind.ASSUMED, "osg-light-defaults", place, name, text)
+        kind = self._kind(place, name, values)
+        extras: dict[str, Any] = {"light_number": number}
+        if left_out:
+            extras["defaults"] = tuple(left_out)
+        position, direction = self._where(place, name, kind, values)
+        return Light(
+            name,
+            document.ref(place),
+            kind,
+            position,
+            direction,
+            _rgb(values["ambient"]),
+            _rgb(values["diffuse"]),
+            _rgb(values["specular"]),
+            (
+                values["constantattenuation"][0],
+                values["linearattenuation"][0],
+                values["quadraticattenuation"][0],
+            ),
+            spot_cutoff=values["spotcutoff"][0] if kind == "spot" else _NO_SPOT,
+            spot_exponent=values["spotexponent"][0] if kind == "spot" else 0.0,
+            enabled=enabled,
+            extras=extras,
+        )
+
+    def _kind(
+        self, place: Statement, name: str, values: dict[str, tuple[float, ...]]
+    ) -> Literal["point", "spot", "directional", "ambient"]:
+        shines = any(values["diffuse"][:3]) or any(values["specular"][:3])
+        if not shines and any(values["ambient"][:3]):
+            return "ambient"
+        if values["position"][3] == 0.0:
+            return "directional"
+        cutoff = values["spotcutoff"][0]
+        if 0.0 <= cutoff <= 90.0:
+            return "spot"
+        if cutoff != _NO_SPOT:
+            text = f"spot cutoff {cutoff:g}; want 0 to 90, or 180; read as 180"
+            self.document.add(Kind.CLAMPED, "osg-light-cutoff", place, name, text)
+        return "point"
+
+    def _where(
+        self, place: Statement, name: str, kind: str, values: dict[str, tuple[float, ...]]
+    ) -> tuple[Vec3, Vec3]:
+        """Position and the way the light travels; OpenGL's position of a directional light is the
+        direction to it.
+        """
+        x, y, z, w = values["position"]
+        if kind == "directional":
+            travel, position = (-x, -y, -z), (0.0, 0.0, 0.0)
+        else:
+            travel = values["direction"][0], values["direction"][1], values["direction"][2]
+            position = (x / w, y / w, z / w) if w else (x, y, z)
+        length = math.hypot(*travel)
+        if not 0.0 < length < math.inf or not all(map(math.isfinite, position)):
+            if kind in ("directional", "spot"):
+                text = "direction or position is out of range; it shines along -Z from the origin"
+                self.document.add(Kind.INVALID, "osg-light-direction", place, name, text)
+            travel, length = (0.0, 0.0, -1.0), 1.0
+            position = position if all(map(math.isfinite, position)) else (0.0, 0.0, 0.0)
+        return position, (travel[0] / length, travel[1] / length, travel[2] / length)
+
+    def _shared_number(self, place: Statement, number: int) -> None:
+        """OpenGL has one light to a number; a database means all of them."""
+        first = self._numbers.setdefault(number, len(self.lights) - 1)
+        if first != len(self.lights) - 1:
+            text = f"GL_LIGHT{number} is {self.lights[first].name} too; all are kept"
+            name = self.lights[-1].name
+            self.document.add(Kind.ASSUMED, "osg-light-number", place, name, text)
+
+    def light_points(self, node: Statement, name: str) -> dict[str, Any]:
+        """The light points of an osgSim::LightPointNode as extras of its node, and a finding."""
+        document = self.document
+        listed = document.field(node, "lightpointlist")
+        places = listed if listed is not None else node
+        points = []
+        for place in places.block.statements if places.block is not None else []:
+            if place.key != "lightpoint":
+                continue
+            on, intensity, radius = self._attributes(place)
+            points.append(
+                {
+                    "on": on,
+                    "position": document.numbers(place, 3, "position") or (0.0, 0.0, 0.0),
+                    "color": document.numbers(place, 4, "color") or (1.0, 1.0, 1.0, 1.0),
+                    "intensity": intensity,
+                    "radius": radius,
+                }
+            )
+        if not points:
+            return {}
+        colours = sorted({point["color"] for point in points})
+        shown = "; ".join(_listed(colour) for colour in colours[:4])
+        more = f" and {len(colours) - 4} more" if len(colours) > 4 else ""
+        text = (
+            f"light points have no home yet: {len(points)} of colour {shown}{more}; "
+            "kept as notes of their node"
+        )
+        document.add(Kind.DROPPED, "osg-light-points", node, name, text)
+        return {"light_points": tuple(points)}
+
+    def _attributes(self, place: Statement) -> tuple[bool, float, float]:
+        """On, intensity, radius. .osgt has ``Attributes TRUE 1 0.4 0.05``, the 1 being a blend mode."""
+        document = self.document
+        found = document.field(place, "attributes")
+        if found is None:
+            on = document.word(place, "ison") != "FALSE"
+            intensity = document.number(place, 1.0, "intensity")
+            return on, intensity, document.number(place, 1.0, "radius")
+        values = [_finite(word, 1.0) for word in found.words[3:5]]
+        values += [1.0] * (2 - len(values))
+        return found.words[1:2] != ["FALSE"], values[0], values[1]
+
+
+def _finite(word: str, default: float) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        return default
+    return value if math.isfinite(value) else default
+
+
+def _rgb(values: tuple[float, ...]) -> RGB:
+    return values[0], values[1], values[2]
+
+
+def _listed(values: tuple[float, ...]) -> str:
+    return "(" + ", ".join(f"{value:g}" for value in values) + ")"

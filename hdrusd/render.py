@@ -1,0 +1,243 @@
+"""A stage becomes frames: ``render_sequence``, HDR in cd/m2 and what a display shows of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+from pxr import Sdf, Tf, Usd, UsdGeom
+
+from hdrusd.display import Display, Writer
+from hdrusd.errors import InputError, SourceRef
+from hdrusd.frames import frame_path
+from hdrusd.gpu.hdr import HdrRenderer, Reflection
+from hdrusd.gpu.program import Programs
+from hdrusd.images import read_image, write_exr, write_png
+from hdrusd.report import Kind, Report
+from hdrusd.scene import Camera, ImageData, TextureRef
+from hdrusd.tonemap.operator import Operator, Parameters, Statistics
+from hdrusd.units import TEXTURE_GAMMA
+from hdrusd.usd.assets import asset_bytes
+from hdrusd.usd.extract import StageReader
+from hdrusd.usd.settings import read_settings
+
+#: Width of a picture that neither the stage nor the user sizes (usdrecord's).
+DEFAULT_WIDTH = 960
+
+#: The largest picture; OpenGL 3.3 grants no more on many devices.
+MAX_SIZE = 16384
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What to render. ``exr`` and ``png`` are file name patterns, either may be None."""
+
+    stage: Path
+    times: Sequence[float] | None = None  # None: the stage's start
+    exr: str | None = None
+    png: str | None = None
+    camera: str | None = None
+    width: int | None = None
+    height: int | None = None
+    operator: Operator | None = None  # None: no display picture
+    parameters: Parameters = field(default_factory=dict)
+    reflection: Reflection = "lambert"
+    gamma: float = TEXTURE_GAMMA
+    purposes: Sequence[str] = ("render",)
+    mask: Sequence[str] = ()
+    session_layer: Path | None = None
+    settings: str | None = None  # path of a RenderSettings prim
+    default_sky: bool = True
+    sky_visible: bool = False
+    half: bool = False
+    resume: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One rendered moment."""
+
+    time: float
+    hdr: npt.NDArray[np.float32]  # (h, w, 3) cd/m2, top row first
+    ldr: npt.NDArray[np.uint8] | None  # (h, w, 3) sRGB
+    statistics: Statistics | None
+    camera: Camera
+    files: tuple[Path, ...] = ()
+    skipped: bool = False
+
+
+def open_stage(path: Path, mask: Sequence[str] = (), session: Path | None = None) -> Usd.Stage:
+    """Open a stage, all of it or what ``mask`` names. Raises InputError."""
+    if not path.is_file():
+        raise InputError(path, "no such file")
+    try:
+        root = Sdf.Layer.FindOrOpen(str(path))
+        if root is None:
+            raise InputError(path, "not a USD layer")
+        session_layer = Sdf.Layer.FindOrOpen(str(session)) if session else None
+        if session and session_layer is None:
+            raise InputError(session, "not a USD layer; see --sessionLayer")
+        if not mask:
+            return Usd.Stage.Open(root, session_layer) if session else Usd.Stage.Open(root)
+        paths = Usd.StagePopulationMask([Sdf.Path(p) for p in mask])
+        if session:
+            return Usd.Stage.OpenMasked(root, session_layer, paths)
+        return Usd.Stage.OpenMasked(root, paths)
+    except Tf.ErrorException as problem:
+        raise InputError(path, f"not a USD stage ({_one_line(problem)})") from problem
+
+
+def _one_line(problem: Exception) -> str:
+    """The first sentence that USD says, without its C++ places."""
+    lines = [line.strip() for line in str(problem).splitlines() if "Error in" in line]
+    text = lines[0].rpartition(" : ")[2] if lines else str(problem)
+    return " ".join(text.split())[:200].strip("' ")
+
+
+class TextureLoader:
+    """Decodes textures for the GPU; what is missing or broken is a finding, once."""
+
+    def __init__(self, stage: Path, report: Report) -> None:
+        self.place = SourceRef(stage)
+        self.report = report
+
+    def __call__(self, ref: TextureRef) -> ImageData | None:
+        if not ref.file:
+            return None
+        try:
+            inside = asset_bytes(ref.file) if "[" in ref.file else None
+            return read_image(Path(ref.file), inside)
+        except (InputError, OSError) as problem:
+            self.report.add(
+                Kind.MISSING,
+                "texture-unreadable",
+                self.place,
+                Path(ref.file).name,
+                f"{problem}; its fallback value is shown",
+            )
+            return None
+
+
+class Renderer:
+    """A stage and a device; frames in any order."""
+
+    def __init__(self, ctx: moderngl.Context, job: Job, report: Report) -> None:
+        self.job = job
+        self.report = report
+        self.stage = open_stage(job.stage, job.mask, job.session_layer)
+        self.settings = read_settings(self.stage, job.settings)
+        self.reader = StageReader(
+            self.stage, report, purposes=job.purposes, default_sky=job.default_sky
+        )
+        self.camera_path = job.camera or self.settings.camera
+        self.size = self._size()
+        programs = Programs(ctx)
+        self.hdr = HdrRenderer(
+            ctx,
+            programs,
+            self.size,
+            TextureLoader(job.stage, report),
+            reflection=job.reflection,
+            gamma=job.gamma,
+        )
+        self.display = Display(ctx, programs, job.operator) if job.operator is not None else None
+
+    @property
+    def times(self) -> Sequence[float]:
+        """The job's time codes, or the stage's start."""
+        return self.job.times if self.job.times is not None else [self.stage.GetStartTimeCode()]
+
+    def frame(self, time: float) -> Frame:
+        """Render one time code."""
+        width, height = self.size
+        camera = self.reader.camera(self.camera_path, time, width / height, self.settings.conform)
+        scene = self.reader.read(time, camera, sky_visible=self.job.sky_visible)
+        texture = self.hdr.render(scene)
+        statistics, ldr = None, None
+        if self.display is not None:
+            parameters = self._parameters(self.display.operator, camera)
+            ldr, statistics = self.display.show(texture, parameters)
+        return Frame(time, self.hdr.read(), ldr, statistics, camera)
+
+    def _parameters(self, operator: Operator, camera: Camera) -> dict[str, Any]:
+        """The user's, else the stage's for this operator, else the camera's exposure."""
+        given = dict(self.job.parameters)
+        names = {parameter.name for parameter in operator.parameters}
+        if self.settings.operator == operator.name:
+            for name, value in (("key", self.settings.key), ("white", self.settings.white)):
+                if name in names and value is not None:
+                    given.setdefault(name, value)
+        if {"scale", "ev100"} <= names and not {"scale", "ev100"} & given.keys():
+            given["scale"] = camera.exposure_scale
+        return given
+
+    def _size(self) -> tuple[int, int]:
+        job, settings = self.job, self.settings
+        if job.width is None and job.height is None and settings.resolution is not None:
+            width, height = settings.resolution
+        else:
+            aspect = self._aspect()
+            width = job.width or (round(job.height * aspect) if job.height else DEFAULT_WIDTH)
+            height = job.height or max(round(width / aspect), 1)
+        if not (1 <= width <= MAX_SIZE and 1 <= height <= MAX_SIZE):
+            raise InputError(self.job.stage, f"{width} x {height} pixels; want 1 to {MAX_SIZE}")
+        return width, height
+
+    def _aspect(self) -> float:
+        """Of the picture: the settings' resolution, else the camera's film."""
+        if self.settings.resolution is not None and self.settings.resolution[1] > 0:
+            return self.settings.resolution[0] / self.settings.resolution[1]
+        prim = self.reader.camera_prim(self.camera_path)
+        if prim is None:
+            return 16.0 / 9.0
+        camera = UsdGeom.Camera(prim)
+        width = float(camera.GetHorizontalApertureAttr().Get())
+        height = float(camera.GetVerticalApertureAttr().Get())
+        return width / height if width > 0.0 and height > 0.0 else 16.0 / 9.0
+
+
+def render_sequence(ctx: moderngl.Context, job: Job, report: Report) -> Iterator[Frame]:
+    """Render and write the frames of a job, in order.
+
+    Encoding overlaps rendering: a thread writes while the next frame is drawn.
+    With ``resume`` a frame whose files are all there is skipped.
+    """
+    renderer = Renderer(ctx, job, report)
+    with Writer() as writer:
+        for time in renderer.times:
+            files = tuple(frame_path(p, time) for p in (job.exr, job.png) if p is not None)
+            if job.resume and files and all(file.is_file() for file in files):
+                blank = np.zeros((0, 0, 3), np.float32)
+                yield Frame(time, blank, None, None, Camera(), files, skipped=True)
+                continue
+            frame = renderer.frame(time)
+            if job.exr is not None:
+                path, header = frame_path(job.exr, time), exr_header(renderer, frame)
+                writer.submit(write_exr, path, frame.hdr, header, half=job.half)
+            if job.png is not None and frame.ldr is not None:
+                writer.submit(write_png, frame_path(job.png, time), frame.ldr)
+            yield Frame(frame.time, frame.hdr, frame.ldr, frame.statistics, frame.camera, files)
+
+
+def exr_header(renderer: Renderer, frame: Frame) -> dict[str, Any]:
+    """What a frame says about itself: time, camera matrices (row vectors, metres), reflection."""
+    camera, stage = frame.camera, renderer.stage
+    view = camera.world_to_view()
+    ndc = view @ camera.projection()
+    header: dict[str, Any] = {
+        "worldToCamera": view.astype(np.float32),
+        "worldToNDC": ndc.astype(np.float32),
+        "hdrusd:frame": float(frame.time),
+        "hdrusd:timeCodesPerSecond": float(stage.GetTimeCodesPerSecond()),
+        "hdrusd:camera": camera.name,
+        "hdrusd:reflection": renderer.job.reflection,
+        "hdrusd:stage": renderer.job.stage.name,
+    }
+    if camera.exposure_scale is not None:
+        header["hdrusd:exposureScale"] = float(camera.exposure_scale)
+    return header
