@@ -7,12 +7,15 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from hdrusd.errors import HdrusdError
 from hdrusd.report import Report
+
+if TYPE_CHECKING:
+    from hdrusd.tonemap.operator import Operator
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -72,6 +75,18 @@ def parse_settings(settings: tuple[str, ...]) -> dict[str, Any]:
     return parsed
 
 
+def chosen_operator(name: str | None, settings: dict[str, Any]) -> Operator:
+    """The operator, its parameters tried on a frame of one luminance. Raises UsageError."""
+    from hdrusd.tonemap.operator import OPERATORS, Statistics
+
+    operator = OPERATORS[name or "reinhard02"]
+    try:
+        operator.uniforms(Statistics(1.0, 1.0, 1.0, 1.0, 1.0, 1.0), operator.settings(settings))
+    except HdrusdError as problem:
+        raise click.UsageError(f"--set: {problem}") from problem
+    return operator
+
+
 def tell(report: Report, quiet: bool) -> None:
     """Findings to standard error: guesses and losses first, a line each, the count last."""
     if quiet or not len(report):
@@ -91,8 +106,12 @@ def write_report(path: Path, document: dict[str, Any]) -> None:
         raise HdrusdError(f"{path}: not a regular file; see --report")
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    temporary.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
-    temporary.replace(path)
+    try:
+        temporary.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
 
 
 def finish(report: Report, strict: bool) -> None:

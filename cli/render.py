@@ -14,6 +14,7 @@ from hdrusd.frames import check_pattern, parse_frames
 
 from .options import (
     FILE,
+    chosen_operator,
     finish,
     operator_options,
     parse_settings,
@@ -147,7 +148,6 @@ def command(stage: Path, output: str, **options: Any) -> None:
 def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
     """The options as a Job. Raises UsageError for what does not go together."""
     from hdrusd.render import Job
-    from hdrusd.tonemap.operator import OPERATORS
 
     suffix = Path(output).suffix.lower()
     if suffix not in (".exr", ".png"):
@@ -157,17 +157,16 @@ def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
         raise click.UsageError("--png: OUTPUT is a PNG already; want OUTPUT.exr beside it")
     if png is not None and Path(png).suffix.lower() != ".png":
         raise click.UsageError(f"--png {png}: want a name that ends in .png")
-    if options["frames"] and options["default_time"]:
+    if options["frames"] is not None and options["default_time"]:
         raise click.UsageError("--frames and --defaultTime exclude one another")
-    times = parse_frames(options["frames"]) if options["frames"] else None
+    times = parse_frames(options["frames"]) if options["frames"] is not None else None
     for pattern in (exr, png):
         if pattern is not None:
             check_pattern(pattern, times)
     operator = None
     settings = parse_settings(options["settings"])
     if png is not None:
-        operator = OPERATORS[options["operator"] or "reinhard02"]
-        operator.settings(settings)
+        operator = chosen_operator(options["operator"], settings)
     elif options["operator"] or settings:
         raise click.UsageError("--operator: nothing is tone mapped; want --png or OUTPUT.png")
     return Job(
@@ -182,8 +181,8 @@ def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
         parameters=settings,
         reflection=options["reflection"],
         gamma=options["gamma"],
-        purposes=[p for p in options["purposes"].replace(",", " ").split() if p],
-        mask=[p for p in (options["mask"] or "").replace(",", " ").split() if p],
+        purposes=_purposes(options["purposes"]),
+        mask=(options["mask"] or "").replace(",", " ").split(),
         session_layer=options["session_layer"],
         settings=options["render_settings_prim_path"],
         default_sky=not options["disable_camera_light"],
@@ -191,3 +190,11 @@ def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
         half=options["half"],
         resume=options["resume"],
     )
+
+
+def _purposes(text: str) -> list[str]:
+    purposes = text.replace(",", " ").split()
+    for purpose in purposes:
+        if purpose not in ("default", "render", "proxy", "guide"):
+            raise click.UsageError(f"--purposes: {purpose}; want render, proxy, guide")
+    return purposes

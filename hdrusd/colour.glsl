@@ -27,7 +27,7 @@ vec3 with_luminance(vec3 rgb, float target)
 }
 
 // Display-linear RGB >= 0 of luminance y into [0, 1], toward the grey of that luminance;
-// but for a rounding, which quantise() takes off.
+// but for a rounding.
 vec3 to_gamut(vec3 rgb, float y)
 {
     float grey = min(y, 1.0);
@@ -40,7 +40,7 @@ vec3 to_gamut(vec3 rgb, float y)
 vec3 srgb_encode_fit(vec3 linear)
 {
     vec3 q = sqrt(sqrt(linear));
-    vec3 curve = ((0.9451641 - 0.1323570 * q) * q + 0.2595052) * q - 0.0723123;
+    vec3 curve = ((0.9561901 - 0.1376821 * q) * q + 0.2524340) * q - 0.0709420;
     return mix(12.92 * linear, curve, greaterThan(linear, vec3(0.0031308)));
 }
 
@@ -57,8 +57,9 @@ float dither(uint x, uint y)
     return float((x * 3242174889u + y * 2447445414u) >> 24) / 256.0 + (0.5 / 256.0 - 0.5);
 }
 
-// Code values [0, 1] to 0 ... 255, rounded after offset (code steps) was added.
+// Code values [0, 1] to 0 ... 255, rounded after offset (code steps) was added; a rounding
+// too many above 1 is taken off.
 uvec3 quantise(vec3 code, float offset)
 {
-    return uvec3(clamp(code * 255.0 + (offset + 0.5), 0.0, 255.0));
+    return uvec3(min(code * 255.0 + (offset + 0.5), 255.0));
 }

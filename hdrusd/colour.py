@@ -58,7 +58,7 @@ def to_gamut(rgb: npt.ArrayLike, y: npt.ArrayLike) -> Array:
     most = rgb.max(axis=-1, keepdims=True)
     outside = most > 1.0
     share = np.where(outside, (1.0 - grey) / np.where(outside, most - grey, 1.0), 1.0)
-    return np.clip(np.where(outside, grey + share * (rgb - grey), rgb), 0.0, 1.0)
+    return np.minimum(np.where(outside, grey + share * (rgb - grey), rgb), 1.0)
 
 
 def srgb_encode(linear: npt.ArrayLike) -> Array:
@@ -69,20 +69,20 @@ def srgb_encode(linear: npt.ArrayLike) -> Array:
 
 
 def srgb_encode_fit(linear: npt.ArrayLike) -> Array:
-    """``srgb_encode`` for 8 bits: within 0.07/255 of it, and exact at 0 and 1.
+    """``srgb_encode`` for 8 bits: within 0.08/255 of it, rising, and exact at 0 and 1.
 
-    A cubic in the fourth root (minimax over the curved part, held at 1). On
+    A cubic in the fourth root (minimax over the curved part, held at both its ends). On
     llvmpipe two square roots cost a fifth of a power function: at 1920x1080 the
     whole of shader 2 takes 11 ms with this and 16 ms with ``pow``.
     """
     linear = np.asarray(linear)
     q = np.sqrt(np.sqrt(np.maximum(linear, 0.0031308)))
-    curve = ((0.9451641 - 0.1323570 * q) * q + 0.2595052) * q - 0.0723123
+    curve = ((0.9561901 - 0.1376821 * q) * q + 0.2524340) * q - 0.0709420
     return np.where(linear > 0.0031308, curve, 12.92 * linear)
 
 
 def srgb_decode(code: npt.ArrayLike) -> Array:
-    """sRGB code values [0, 1] to display-linear [0, 1] (IEC 61966-2-1)."""
+    """Undo ``srgb_encode``: code values [0, 1] to display-linear [0, 1]."""
     code = np.asarray(code)
     curve = ((np.maximum(code, 0.04045) + 0.055) / 1.055) ** 2.4
     return np.where(code > 0.04045, curve, code / 12.92)
@@ -103,4 +103,4 @@ def dither(x: npt.ArrayLike, y: npt.ArrayLike) -> Array:
 def quantise(code: npt.ArrayLike, offset: npt.ArrayLike) -> Array:
     """Code values [0, 1] to 0 ... 255, rounded after ``offset`` (code steps) was added."""
     steps = np.asarray(code) * 255.0 + (np.asarray(offset) + 0.5)
-    return np.clip(steps, 0.0, 255.0).astype(np.uint32)
+    return np.minimum(steps, 255.0).astype(np.uint32)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import queue
-import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -14,14 +14,19 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.colour import dither, quantise, srgb_encode
+from hdrusd.errors import SourceRef
 from hdrusd.gpu.context import create_context
 from hdrusd.gpu.ldr import ToneMapper
 from hdrusd.gpu.measure import Measurer
 from hdrusd.gpu.program import Programs
-from hdrusd.images import read_exr, write_png
+from hdrusd.images import REC709, read_exr, write_png
+from hdrusd.report import Kind, Report
 from hdrusd.tonemap.falsecolour import OPERATOR as FALSE_COLOUR
 from hdrusd.tonemap.legend import SMALLEST, paint_legend
 from hdrusd.tonemap.operator import Operator, Parameters, Statistics
+
+#: Pictures that wait for the writer; each holds a frame in memory.
+_WAITING = 2
 
 
 class Display:
@@ -60,13 +65,15 @@ def tonemap_sequence(
     jobs: Sequence[tuple[Path, Path]],
     operator: Operator,
     parameters: Parameters,
+    report: Report,
     *,
     reference: bool = False,
     resume: bool = False,
 ) -> Iterator[Path | None]:
     """Tone map EXR files into PNG files, in order; None for one that ``resume`` skipped.
 
-    ``reference``: by the NumPy definition instead of the GPU. Raises InputError,
+    ``reference``: by the NumPy definition instead of the GPU. A file that does not say
+    what its numbers are is taken as Rec. 709 in cd/m2, a finding. Raises InputError,
     ContextError.
     """
     display: Display | None = None
@@ -75,7 +82,8 @@ def tonemap_sequence(
             if resume and target.is_file():
                 yield None
                 continue
-            rgb, _ = read_exr(source)
+            rgb, header = read_exr(source)
+            _note_units(source, header, report)
             if reference:
                 settings = operator.settings(parameters)
                 picture = encode(operator.apply(rgb, None, settings))
@@ -90,20 +98,31 @@ def tonemap_sequence(
             yield target
 
 
+def _note_units(source: Path, header: Mapping[str, Any], report: Report) -> None:
+    place = SourceRef(source)
+    if "whiteLuminance" not in header:
+        text = "no whiteLuminance; 1.0 is taken as 1 cd/m2"
+        report.add(Kind.ASSUMED, "exr-unit", place, "", text)
+    primaries = header.get("chromaticities")
+    # OpenEXR's default without the attribute is Rec. 709; 1e-3: headers with rounded values.
+    if primaries is not None and not np.allclose(np.ravel(primaries), REC709, rtol=0, atol=1e-3):
+        text = f"chromaticities {np.ravel(primaries).round(4).tolist()} are read as Rec. 709"
+        report.add(Kind.REPLACED, "exr-primaries", place, "", text)
+
+
 class Writer:
     """One thread that writes files while the caller goes on; two wait at most.
 
-    A failure comes out of the next ``submit`` or of leaving the block. Leaving it
-    by an exception (Ctrl-C) finishes the files in hand, so none is torn.
+    A failure comes out of a later ``submit`` or of leaving the block. Leaving it by
+    an exception (Ctrl-C) finishes the file in hand, so none is torn, and drops those
+    that wait.
     """
 
     def __init__(self) -> None:
-        self._queue: queue.Queue[Callable[[], None] | None] = queue.Queue(maxsize=2)
-        self._failure: BaseException | None = None
-        self._thread = threading.Thread(target=self._work, name="hdrusd-writer")
+        self._pool = ThreadPoolExecutor(1, "hdrusd-writer")
+        self._pending: deque[Future[None]] = deque()
 
     def __enter__(self) -> Writer:
-        self._thread.start()
         return self
 
     def __exit__(
@@ -112,21 +131,14 @@ class Writer:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._queue.put(None)
-        self._thread.join()
-        if error is None and self._failure is not None:
-            raise self._failure
+        try:
+            while error is None and self._pending:
+                self._pending.popleft().result()
+        finally:
+            self._pool.shutdown(cancel_futures=True)
 
     def submit(self, write: Callable[..., None], *args: Any, **options: Any) -> None:
         """Have ``write(*args, **options)`` called; waits while two others are waiting."""
-        if self._failure is not None:
-            raise self._failure
-        self._queue.put(lambda: write(*args, **options))
-
-    def _work(self) -> None:
-        while (task := self._queue.get()) is not None:
-            if self._failure is None:
-                try:
-                    task()
-                except BaseException as failure:  # handed to the caller's thread
-                    self._failure = failure
+        while self._pending and (self._pending[0].done() or len(self._pending) > _WAITING):
+            self._pending.popleft().result()
+        self._pending.append(self._pool.submit(write, *args, **options))

@@ -21,6 +21,17 @@ from difflib import get_close_matches
 from pathlib import Path
 
 
+#: Characters of a message or a name; file formats have names of any length.
+_LONGEST = 400
+
+
+def one_line(text: str) -> str:
+    """``text`` without control characters, which a terminal would obey, and not too long."""
+    if not text.isprintable():
+        text = "".join(c if c.isprintable() else " " for c in text)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}... ({len(text)} characters)"
+
+
 @dataclass(frozen=True, slots=True)
 class SourceRef:
     """Where a thing was said: a file, and a line or a path inside it."""
@@ -45,8 +56,8 @@ class InputError(HdrusdError):
 
     def __init__(self, source: SourceRef | Path, problem: str) -> None:
         self.source = source if isinstance(source, SourceRef) else SourceRef(source)
-        self.problem = problem
-        super().__init__(f"{self.source}: {problem}")
+        self.problem = one_line(problem)
+        super().__init__(f"{self.source}: {self.problem}")
 
 
 class UnknownNameError(HdrusdError):

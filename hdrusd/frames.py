@@ -16,6 +16,9 @@ from hdrusd.errors import HdrusdError
 #: More frames than this in one list is a slip of the keyboard.
 MAX_FRAMES = 1_000_000
 
+#: No time code is larger, and no stride is smaller than its inverse.
+MAX_TIME = Decimal(10) ** 9
+
 _PLACEHOLDER = re.compile(r"#+(?:\.#+)?")
 _FLOAT_PLACEHOLDER = re.compile(r"#+\.#+")
 
@@ -38,19 +41,21 @@ def parse_frames(spec: str) -> list[float]:
 
 
 def _parse_range(part: str, spec: str) -> Iterator[Decimal]:
-    span, _, stride_text = part.partition("x")
+    span, by, stride_text = part.partition("x")
     first_text, colon, last_text = span.partition(":")
     try:
         first = Decimal(first_text)
         last = Decimal(last_text) if colon else first
-        stride = Decimal(stride_text) if stride_text else Decimal(1)
+        stride = Decimal(stride_text) if by else Decimal(1)
     except InvalidOperation:
         raise FrameError(
             f"--frames: {part or spec!r}: not a frame list; want 101, 101:105, 101:109x2"
         ) from None
     if not (first.is_finite() and last.is_finite() and stride.is_finite()):
         raise FrameError(f"--frames: {part}: want finite numbers")
-    if "x" in part and (not colon or stride == 0 or (stride < 0 and last >= first)):
+    if max(abs(first), abs(last)) > MAX_TIME or 0 < abs(stride) < 1 / MAX_TIME:
+        raise FrameError(f"--frames: {part}: want frames to {MAX_TIME:g}, strides from 1e-9")
+    if by and (not colon or stride == 0 or (stride < 0 and last >= first)):
         raise FrameError(f"--frames: {part}: want a stride that leads from first to last")
     stride = abs(stride)
     count = int(abs(last - first) / stride)
@@ -99,13 +104,16 @@ def _substitute(name: str, number: object) -> str:
 def check_pattern(pattern: str, times: Sequence[float] | None) -> None:
     """Refuse a name that cannot hold the frames: none or two placeholders, lost fractions.
 
-    ``times`` None: a single picture without a frame list. Raises FrameError.
+    ``times`` None: a single picture without a frame list, which takes no placeholder
+    (as in usdrecord). Raises FrameError.
     """
     name = Path(pattern).name
     found = _PLACEHOLDER.findall(name)
     if len(found) > 1:
         raise FrameError(f"{name}: two frame placeholders; want one, as in out.####.exr")
     if times is None:
+        if found:
+            raise FrameError(f"{name}: a frame placeholder and no frames; want a plain name")
         return
     if not found:
         raise FrameError(f"{name}: no frame placeholder; want one, as in out.####.exr")
@@ -118,7 +126,10 @@ def check_pattern(pattern: str, times: Sequence[float] | None) -> None:
 
 
 def find_frames(pattern: str) -> list[tuple[float, Path]]:
-    """The numbered files that exist, by frame; a plain name is its own frame 0."""
+    """The numbered files that exist, by frame; a plain name is its own frame 0.
+
+    A number is written as ``frame_path`` writes it: in.####.exr is not in.1.exr.
+    """
     path = Path(pattern)
     if not has_placeholder(pattern):
         return [(0.0, path)]
@@ -133,4 +144,4 @@ def find_frames(pattern: str) -> list[tuple[float, Path]]:
         for file in path.parent.glob("*")
         if (match := re.fullmatch(expression, file.name)) is not None
     ]
-    return sorted(frames)
+    return sorted((time, file) for time, file in frames if frame_path(pattern, time) == file)

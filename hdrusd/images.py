@@ -7,6 +7,7 @@ attributes). Files appear under their name only when they are whole.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import tempfile
 from collections.abc import Callable, Mapping
@@ -18,7 +19,7 @@ import numpy.typing as npt
 import OpenEXR
 import OpenImageIO as oiio
 
-from hdrusd.errors import InputError
+from hdrusd.errors import HdrusdError, InputError
 from hdrusd.scene import ImageData
 
 #: Rec. 709 primaries and D65, CIE 1931 xy: red, green, blue, white.
@@ -27,13 +28,19 @@ REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 #: A declared size is not believed beyond this many pixels.
 MAX_PIXELS = 16384 * 16384
 
+#: Nor beyond this many a byte of the file: no codec packs that tight.
+_PIXELS_A_BYTE = 10_000
+
+#: The largest finite half float.
+HALF_MAX = 65504.0
+
 
 def read_image(path: Path, data: bytes | None = None) -> ImageData:
     """Decode a texture: (h, w, 1 to 4) uint8, float16 or float32, top row first.
 
     ``data``: the encoded bytes, when the file lies in a package or another file;
     ``path`` then only names it. 16-bit integers come back as float32 in [0, 1].
-    Raises InputError.
+    Colours are as the file has them, not multiplied by alpha. Raises InputError.
     """
     if data is None and not path.is_file():
         raise InputError(path, "no such image")
@@ -46,15 +53,14 @@ def read_image(path: Path, data: bytes | None = None) -> ImageData:
 
 
 def _decode(real: Path, named: Path) -> ImageData:
-    picture = oiio.ImageInput.open(str(real))
+    config = oiio.ImageSpec()
+    config.attribute("oiio:UnassociatedAlpha", 1)
+    picture = oiio.ImageInput.open(str(real), config)
     if picture is None:
         raise InputError(named, f"not a readable image ({_first_line(oiio.geterror())})")
     try:
         spec = picture.spec()
-        if spec.width * spec.height > MAX_PIXELS or spec.width < 1 or spec.height < 1:
-            raise InputError(named, f"{spec.width} x {spec.height} pixels; want 1 to {MAX_PIXELS}")
-        if real.stat().st_size * 10_000 < spec.width * spec.height:  # no codec packs that tight
-            raise InputError(named, f"{spec.width} x {spec.height} pixels declared, not there")
+        _check_size(named, spec.width, spec.height, real.stat().st_size)
         kind = {"uint8": oiio.UINT8, "half": oiio.HALF}.get(str(spec.format), oiio.FLOAT)
         channels = min(spec.nchannels, 4)
         pixels = picture.read_image(0, 0, 0, channels, kind)
@@ -66,6 +72,14 @@ def _decode(real: Path, named: Path) -> ImageData:
         picture.close()
 
 
+def _check_size(named: Path, width: int, height: int, size: int) -> None:
+    """Refuse a declared size that is absurd, or more than ``size`` bytes of file can hold."""
+    if not (width >= 1 and height >= 1 and width * height <= MAX_PIXELS):
+        raise InputError(named, f"{width} x {height} pixels; want 1 to {MAX_PIXELS}")
+    if size * _PIXELS_A_BYTE < width * height:
+        raise InputError(named, f"{width} x {height} pixels declared, not there")
+
+
 def _first_line(text: str) -> str:
     return (text.strip().splitlines() or ["unknown format"])[0]
 
@@ -74,15 +88,19 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
     """Let ``write`` fill a temporary file beside ``path``, then rename it to ``path``.
 
     The temporary name keeps the suffix, by which libraries choose the format. On
-    any failure it is removed and ``path`` stays as it was.
+    any failure it is removed and ``path`` stays as it was. Raises OSError, and
+    HdrusdError for what an image library says.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
     try:
         write(temporary)
         temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
+    except BaseException as problem:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        if isinstance(problem, RuntimeError):
+            raise HdrusdError(f"{path}: cannot be written ({_first_line(str(problem))})") from None
         raise
 
 
@@ -98,10 +116,11 @@ def write_exr(
 
     ``luminance``: the values are cd/m2 and the header says so; False for
     reflectance maps. ``attributes``: further header entries (str, int, float,
-    NumPy arrays of 9 or 16 floats).
+    NumPy arrays of 9 or 16 floats). ``half``: half floats; what is beyond +-65504 is
+    written as that (``half_clipped`` counts it).
     """
     dtype = np.float16 if half else np.float32
-    pixels = np.ascontiguousarray(rgb, dtype)
+    pixels = np.ascontiguousarray(np.clip(rgb, -HALF_MAX, HALF_MAX) if half else rgb, dtype)
     header: dict[str, Any] = {
         "compression": OpenEXR.ZIP_COMPRESSION,
         "type": OpenEXR.scanlineimage,
@@ -120,25 +139,39 @@ def write_exr(
     write_atomically(path, write)
 
 
+def half_clipped(rgb: npt.NDArray[np.floating[Any]]) -> int:
+    """How many pixels have a value that a half float cannot hold."""
+    return int(np.count_nonzero(np.any(np.abs(rgb) > HALF_MAX, axis=-1)))
+
+
 def read_exr(path: Path) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
     """RGB as (h, w, 3) float32 and the header; grey is spread over three channels.
 
     Values are multiplied by ``whiteLuminance`` where a file has another than 1,
-    so that 1.0 is 1 cd/m2. Raises InputError.
+    so that 1.0 is 1 cd/m2. The first part of a file is read, its data window.
+    Raises InputError.
     """
     if not path.is_file():
         raise InputError(path, "no such file")
     try:
+        with OpenEXR.File(str(path), header_only=True) as file:
+            low, high = (np.asarray(v, np.int64) for v in file.header()["dataWindow"])
+        width, height = (int(v) for v in high - low + 1)
+        _check_size(path, width, height, path.stat().st_size)
         with OpenEXR.File(str(path), separate_channels=True) as file:
             header = dict(file.header())
             channels = {name: np.asarray(c.pixels) for name, c in file.channels().items()}
-    except (RuntimeError, ValueError, TypeError) as problem:
+    except (RuntimeError, ValueError, TypeError, KeyError) as problem:
         raise InputError(path, f"not a readable EXR ({_first_line(str(problem))})") from problem
     names = [n for n in ("R", "G", "B") if n in channels] or [n for n in ("Y",) if n in channels]
     if len(names) not in (1, 3):
         raise InputError(path, f"channels {', '.join(sorted(channels))}; want R, G, B or Y")
+    if any(channels[name].shape != (height, width) for name in names):
+        raise InputError(path, "channels of different sizes; want whole ones")
     rgb = np.stack([channels[names[i % len(names)]].astype(np.float32) for i in range(3)], axis=-1)
     white = float(header.get("whiteLuminance", 1.0))
+    if not 0.0 < white < np.inf:
+        raise InputError(path, f"whiteLuminance {white:g}; want a positive number")
     return (rgb if white == 1.0 else (rgb * white).astype(np.float32)), header
 
 
@@ -154,11 +187,9 @@ def write_png(path: Path, pixels: npt.NDArray[np.uint8], comment: str = "") -> N
             spec.attribute("ImageDescription", comment)
         out = oiio.ImageOutput.create(str(temporary))
         if out is None or not out.open(str(temporary), spec):
-            raise OSError(f"{path}: cannot be written: {oiio.geterror()}")
-        try:
-            if not out.write_image(np.ascontiguousarray(pixels)):
-                raise OSError(f"{path}: {out.geterror()}")
-        finally:
-            out.close()
+            raise RuntimeError(out.geterror() if out else oiio.geterror())
+        whole = out.write_image(np.ascontiguousarray(pixels))
+        if not out.close() or not whole:  # the last bytes are only written now
+            raise RuntimeError(out.geterror())
 
     write_atomically(path, write)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,14 +12,14 @@ from typing import Any
 import moderngl
 import numpy as np
 import numpy.typing as npt
-from pxr import Sdf, Tf, Usd, UsdGeom
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
 
 from hdrusd.display import Display, Writer
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.frames import frame_path
 from hdrusd.gpu.hdr import HdrRenderer, Reflection
 from hdrusd.gpu.program import Programs
-from hdrusd.images import read_image, write_exr, write_png
+from hdrusd.images import half_clipped, read_image, write_exr, write_png
 from hdrusd.report import Kind, Report
 from hdrusd.scene import Camera, ImageData, TextureRef
 from hdrusd.tonemap.operator import Operator, Parameters, Statistics
@@ -71,25 +73,60 @@ class Frame:
     skipped: bool = False
 
 
-def open_stage(path: Path, mask: Sequence[str] = (), session: Path | None = None) -> Usd.Stage:
-    """Open a stage, all of it or what ``mask`` names. Raises InputError."""
+def open_stage(
+    path: Path,
+    mask: Sequence[str] = (),
+    session: Path | None = None,
+    report: Report | None = None,
+) -> Usd.Stage:
+    """Open a stage, all of it or what ``mask`` names.
+
+    ``report``: takes what USD warns of (arcs that lead nowhere or in a circle), which
+    otherwise goes to standard error. Raises InputError.
+    """
+    paths = [_mask_path(path, name) for name in mask]
+    delegate = UsdUtils.CoalescingDiagnosticDelegate() if report is not None else None
+    root, over = _layer(path), None if session is None else _layer(session)
+    try:
+        if mask:
+            population = Usd.StagePopulationMask(paths)
+            stage = Usd.Stage.OpenMasked(root, *([over] if over else []), population)
+        else:
+            stage = Usd.Stage.Open(root, *([over] if over else []))
+    except Tf.ErrorException as problem:
+        raise InputError(path, f"not a USD stage ({_one_line(problem)})") from problem
+    if report is not None and delegate is not None:
+        for said in delegate.TakeUncoalescedDiagnostics():
+            report.add(Kind.INVALID, "usd-warning", SourceRef(path), "", _warning(said.commentary))
+        for target in paths:
+            if not stage.GetPrimAtPath(target):
+                report.add(Kind.MISSING, "mask", SourceRef(path), str(target), "no such prim")
+    return stage
+
+
+def _layer(path: Path) -> Sdf.Layer:
     if not path.is_file():
         raise InputError(path, "no such file")
     try:
-        root = Sdf.Layer.FindOrOpen(str(path))
-        if root is None:
-            raise InputError(path, "not a USD layer")
-        session_layer = Sdf.Layer.FindOrOpen(str(session)) if session else None
-        if session and session_layer is None:
-            raise InputError(session, "not a USD layer; see --sessionLayer")
-        if not mask:
-            return Usd.Stage.Open(root, session_layer) if session else Usd.Stage.Open(root)
-        paths = Usd.StagePopulationMask([Sdf.Path(p) for p in mask])
-        if session:
-            return Usd.Stage.OpenMasked(root, session_layer, paths)
-        return Usd.Stage.OpenMasked(root, paths)
+        layer = Sdf.Layer.FindOrOpen(str(path))
     except Tf.ErrorException as problem:
-        raise InputError(path, f"not a USD stage ({_one_line(problem)})") from problem
+        raise InputError(path, f"not a USD layer ({_one_line(problem)})") from problem
+    if layer is None:
+        raise InputError(path, "not a USD layer")
+    return layer
+
+
+def _mask_path(stage: Path, name: str) -> Sdf.Path:
+    path = Sdf.Path(name) if Sdf.Path.IsValidPathString(name) else Sdf.Path()
+    if not path.IsAbsoluteRootOrPrimPath():
+        raise InputError(stage, f"--mask {name}: no prim path; want one like /World/Street")
+    return path
+
+
+def _warning(text: str) -> str:
+    """A warning of USD in one line, without addresses of this process and how it came up."""
+    text = re.sub(r"@anon:[^@]*@|\(instantiating stage on stage [^)]*\)", "", text)
+    return " ".join(text.split())[:300]
 
 
 def _one_line(problem: Exception) -> str:
@@ -129,7 +166,7 @@ class Renderer:
     def __init__(self, ctx: moderngl.Context, job: Job, report: Report) -> None:
         self.job = job
         self.report = report
-        self.stage = open_stage(job.stage, job.mask, job.session_layer)
+        self.stage = open_stage(job.stage, job.mask, job.session_layer, report)
         self.settings = read_settings(self.stage, job.settings)
         self.reader = StageReader(
             self.stage, report, purposes=job.purposes, default_sky=job.default_sky
@@ -153,7 +190,13 @@ class Renderer:
         return self.job.times if self.job.times is not None else [self.stage.GetStartTimeCode()]
 
     def frame(self, time: float) -> Frame:
-        """Render one time code."""
+        """Render one time code (NaN: the default time). Raises InputError."""
+        try:
+            return self._frame(time)
+        except Tf.ErrorException as problem:
+            raise InputError(self.job.stage, f"frame {time:g}: {_one_line(problem)}") from problem
+
+    def _frame(self, time: float) -> Frame:
         width, height = self.size
         camera = self.reader.camera(self.camera_path, time, width / height, self.settings.conform)
         scene = self.reader.read(time, camera, sky_visible=self.job.sky_visible)
@@ -218,6 +261,9 @@ def render_sequence(ctx: moderngl.Context, job: Job, report: Report) -> Iterator
             frame = renderer.frame(time)
             if job.exr is not None:
                 path, header = frame_path(job.exr, time), exr_header(renderer, frame)
+                if job.half and (clipped := half_clipped(frame.hdr)):
+                    text = f"{clipped} pixels are clipped at 65504 cd/m2, where half floats end"
+                    report.add(Kind.CLAMPED, "half-clipped", SourceRef(path), "", text)
                 writer.submit(write_exr, path, frame.hdr, header, half=job.half)
             if job.png is not None and frame.ldr is not None:
                 writer.submit(write_png, frame_path(job.png, time), frame.ldr)
@@ -232,12 +278,13 @@ def exr_header(renderer: Renderer, frame: Frame) -> dict[str, Any]:
     header: dict[str, Any] = {
         "worldToCamera": view.astype(np.float32),
         "worldToNDC": ndc.astype(np.float32),
-        "hdrusd:frame": float(frame.time),
         "hdrusd:timeCodesPerSecond": float(stage.GetTimeCodesPerSecond()),
         "hdrusd:camera": camera.name,
         "hdrusd:reflection": renderer.job.reflection,
         "hdrusd:stage": renderer.job.stage.name,
     }
+    if math.isfinite(frame.time):  # the default time is no number
+        header["hdrusd:frame"] = float(frame.time)
     if camera.exposure_scale is not None:
         header["hdrusd:exposureScale"] = float(camera.exposure_scale)
     return header

@@ -7,9 +7,14 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
+from pathlib import Path
 from typing import Any
 
-from hdrusd.errors import SourceRef
+from hdrusd.errors import SourceRef, one_line
+
+#: Findings of one kind and code that are listed for one file; more are counted only, so that
+#: a hostile file cannot fill the memory or the terminal.
+LISTED = 200
 
 
 class Kind(StrEnum):
@@ -50,44 +55,61 @@ class Finding:
         }
 
 
+#: What is counted together: kind, code, file.
+_Family = tuple[Kind, str, Path]
+
+
 @dataclass(slots=True)
 class Report:
-    """The findings of one run, in order, each said once."""
+    """The findings of one run, in order, each said once.
 
-    findings: list[Finding] = field(default_factory=list)
-    _seen: set[Finding] = field(default_factory=set, repr=False)
+    Of one kind and code in one file ``LISTED`` are kept; one finding at the end says how
+    many more there were. Those are not compared with one another: repeats count.
+    """
+
+    _listed: dict[Finding, None] = field(default_factory=dict, repr=False)
+    _counts: Counter[_Family] = field(default_factory=Counter, repr=False)
 
     def add(self, kind: Kind, code: str, source: SourceRef, thing: str, text: str) -> None:
         """Note a finding; the same one twice is kept once."""
-        finding = Finding(kind, code, source, thing, text)
-        if finding not in self._seen:
-            self._seen.add(finding)
-            self.findings.append(finding)
+        finding = Finding(kind, code, source, one_line(thing), one_line(text))
+        if finding in self._listed:
+            return
+        family = kind, code, source.file
+        self._counts[family] += 1
+        if self._counts[family] <= LISTED:
+            self._listed[finding] = None
 
     def __iter__(self) -> Iterator[Finding]:
-        return iter(self.findings)
+        yield from self._listed
+        for (kind, code, file), count in self._counts.items():
+            if count > LISTED:
+                text = f"{count - LISTED} more {code}; the first {LISTED} are listed"
+                yield Finding(kind, code, SourceRef(file), "", text)
 
     def __len__(self) -> int:
-        return len(self.findings)
+        return self._counts.total()
 
     def codes(self) -> set[str]:
         """The distinct codes, for tests and ``--strict`` decisions."""
-        return {finding.code for finding in self.findings}
+        return {code for _, code, _ in self._counts}
 
     def summary(self) -> str:
-        """One line: how many of each kind."""
-        counts = Counter(str(finding.kind) for finding in self.findings)
-        if not counts:
+        """One line: how many of each kind, those that are not listed too."""
+        if not self._counts:
             return "no findings"
-        parts = ", ".join(f"{n} {kind}" for kind, n in sorted(counts.items()))
-        return f"{len(self.findings)} findings: {parts}"
+        kinds: Counter[str] = Counter()
+        for (kind, _, _), count in self._counts.items():
+            kinds[str(kind)] += count
+        parts = ", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items()))
+        return f"{len(self)} findings: {parts}"
 
     def as_dict(self) -> dict[str, Any]:
         """The whole report, ready for ``json.dumps``."""
         return {
             "format": "hdrusd-report/1",
             "summary": self.summary(),
-            "findings": [finding.as_dict() for finding in self.findings],
+            "findings": [finding.as_dict() for finding in self],
         }
 
     def to_json(self) -> str:

@@ -46,7 +46,7 @@ def run_hdrusd(*arguments: str) -> str:
 
 def listed_commands() -> dict[str, str]:
     """Name and short help of each command, as ``hdrusd --help`` has them."""
-    listing = run_hdrusd("--help").split("Commands:\n")[1]
+    listing = run_hdrusd("--help").split("Commands:\n")[1].split("\n\n")[0]
     return dict(re.findall(r"^  (\S+)(?: +(.*))?$", listing, re.MULTILINE))
 
 
@@ -82,7 +82,9 @@ def finding_codes(source: str) -> Iterator[str]:
         if isinstance(node, ast.Dict):
             rows = zip(node.keys, node.values, strict=True)
             yield from literals(
-                key for key, row in rows if isinstance(row, ast.Tuple) and is_kind(row.elts[0])
+                key
+                for key, row in rows
+                if isinstance(row, ast.Tuple) and any(map(is_kind, row.elts))
             )
         parts = node.args if isinstance(node, ast.Call) else getattr(node, "elts", [])
         yield from literals(code for kind, code in pairwise(parts) if is_kind(kind))

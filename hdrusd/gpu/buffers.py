@@ -1,106 +1,63 @@
-"""RenderScene arrays on the GPU: geometry kept between frames, lights as one texture."""
+"""RenderScene arrays in the layouts that the shaders read."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
-import moderngl
 import numpy as np
 import numpy.typing as npt
 
 from hdrusd.scene import NO_CONE, Camera, Draw, Geometry
+
+Floats = npt.NDArray[np.float32]
 
 #: Texels (of 4 floats) a light: a plain one, and one with a cone or focus.
 PLAIN_ROWS = 2
 CONE_ROWS = 4
 
 
-@dataclass(slots=True)
-class Uploaded:
-    """One geometry's vertex buffer, and the frame that last drew it."""
+def corner_buffer(
+    geometry: Geometry, uv_sets: list[str], color: str
+) -> tuple[Floats, list[tuple[str, str]]]:
+    """Corner attributes side by side, (3 t, .) float32, and (format, attribute) of each part.
 
-    version: int
-    buffer: moderngl.Buffer
-    layout: str
-    attributes: list[str]
-    vertices: int
-    used: int
-
-
-class GeometryCache:
-    """Vertex buffers by geometry key: what does not change is uploaded once."""
-
-    def __init__(self, ctx: moderngl.Context) -> None:
-        self.ctx = ctx
-        self.frame = 0
-        self._kept: dict[tuple[str, tuple[str, ...], str], Uploaded] = {}
-
-    def get(self, geometry: Geometry, uv_sets: list[str], color: str) -> Uploaded:
-        """The buffer for ``geometry`` with these texture coordinate sets and colour primvar."""
-        key = (geometry.key, tuple(uv_sets), color)
-        kept = self._kept.get(key)
-        if kept is None or kept.version != geometry.version:
-            if kept is not None:
-                kept.buffer.release()
-            kept = self._upload(geometry, uv_sets, color)
-            self._kept[key] = kept
-        kept.used = self.frame
-        return kept
-
-    def next_frame(self, keep: int = 2) -> None:
-        """Release what no draw has used for ``keep`` frames."""
-        self.frame += 1
-        for key in [k for k, v in self._kept.items() if v.used < self.frame - keep]:
-            self._kept.pop(key).buffer.release()
-
-    def _upload(self, geometry: Geometry, uv_sets: list[str], color: str) -> Uploaded:
-        columns = [geometry.points, geometry.normals]
-        layout, attributes = ["3f", "3f"], ["in_position", "in_normal"]
-        uvs = [geometry.uvs.get(name) for name in uv_sets]
-        blank = np.zeros((len(geometry.points), 2), np.float32)
-        for first, name in ((0, "in_uv01"), (2, "in_uv23")):
-            pair = uvs[first : first + 2]
-            if pair:
-                arrays = [a if a is not None else blank for a in pair]
-                columns += [*arrays, blank][:2]
-                layout.append("4f")
-                attributes.append(name)
-        colors = geometry.colors.get(color) if color else None
-        if colors is not None:
-            columns.append(colors)
-            layout.append("3f")
-            attributes.append("in_color")
-        data = np.ascontiguousarray(np.concatenate(columns, axis=1), np.float32)
-        return Uploaded(
-            version=geometry.version,
-            buffer=self.ctx.buffer(data),
-            layout=" ".join(layout),
-            attributes=attributes,
-            vertices=len(data),
-            used=self.frame,
-        )
+    ``uv_sets``: up to four, two to an attribute; one that the geometry has not is 0.
+    ``color``: a primvar of it, or "".
+    """
+    count = len(geometry.points)
+    columns: list[Floats] = [geometry.points, geometry.normals]
+    content = [("3f", "in_position"), ("3f", "in_normal")]
+    blank = np.zeros((count, 2), np.float32)
+    uvs = [geometry.uvs.get(name, blank) for name in uv_sets[:4]]
+    for first, name in ((0, "in_uv01"), (2, "in_uv23")):
+        pair = uvs[first : first + 2]
+        if pair:
+            columns += [*pair, blank][:2]
+            content.append(("4f", name))
+    if color:
+        columns.append(geometry.colors[color])
+        content.append(("3f", "in_color"))
+    return np.ascontiguousarray(np.concatenate(columns, axis=1), np.float32), content
 
 
-def instance_rows(draw: Draw, camera: Camera) -> npt.NDArray[np.float32]:
+def instance_rows(draw: Draw, camera: Camera) -> Floats:
     """(k, 12) float32: the columns of each transform, relative to the eye.
 
     The eye is subtracted in float64, so that a stage far from its origin keeps its
     millimetres.
     """
-    m = draw.transforms.copy()
-    m[:, 3, :3] -= np.asarray(camera.eye)
-    return np.ascontiguousarray(m[:, :, :3].transpose(0, 2, 1).reshape(-1, 12), np.float32)
+    m = draw.transforms[:, :, :3].copy()
+    m[:, 3] -= camera.eye
+    return np.ascontiguousarray(m.transpose(0, 2, 1).reshape(-1, 12), np.float32)
 
 
 def mirrored(draw: Draw) -> npt.NDArray[np.bool_]:
     """(k,) True where a transform turns right hands into left ones."""
-    return np.asarray(np.linalg.det(draw.transforms[:, :3, :3]) < 0.0)
+    a, b, c = (draw.transforms[:, i, :3] for i in range(3))
+    return np.asarray(np.sum(np.cross(a, b) * c, axis=1) < 0.0)
 
 
-def light_texels(
-    lights: npt.NDArray[np.void], camera: Camera
-) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+def light_texels(lights: npt.NDArray[np.void], camera: Camera) -> tuple[Floats, Floats]:
     """Plain lights as (n, 2, 4) and those with a cone or focus as (m, 4, 4), for light.vert.
 
     Dark lights are left out: they add nothing. Positions are relative to the eye.
@@ -110,7 +67,7 @@ def light_texels(
     return _rows(lit[~cone], camera, PLAIN_ROWS), _rows(lit[cone], camera, CONE_ROWS)
 
 
-def _rows(lights: npt.NDArray[np.void], camera: Camera, rows: int) -> npt.NDArray[np.float32]:
+def _rows(lights: npt.NDArray[np.void], camera: Camera, rows: int) -> Floats:
     texels: npt.NDArray[Any] = np.zeros((len(lights), rows, 4), np.float64)
     relative = lights["position"] - lights["w"][:, None] * np.asarray(camera.eye)
     texels[:, 0, :3], texels[:, 0, 3] = relative, lights["w"]

@@ -18,10 +18,11 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.gpu.buffers import GeometryCache, instance_rows, light_texels, mirrored
+from hdrusd.gpu.buffers import light_texels
 from hdrusd.gpu.program import Programs
+from hdrusd.gpu.surfaces import SurfacePass, set_used
 from hdrusd.gpu.textures import TextureCache
-from hdrusd.scene import Camera, Draw, ImageData, Material, RenderScene, TextureRef, TextureUse
+from hdrusd.scene import Camera, ImageData, RenderScene, TextureRef
 from hdrusd.units import TEXTURE_GAMMA
 
 Reflection = Literal["lambert", "petit2010"]
@@ -31,9 +32,6 @@ REFLECTION_SCALE: dict[str, float] = {"lambert": 1.0 / math.pi, "petit2010": 1.0
 
 #: Lights a batch by rows a light: 31 flat vec4 are what OpenGL 3.3 grants between stages.
 _BATCH = {2: 15, 4: 7}
-
-_MAPS = ("diffuse_map", "emission_map", "opacity_map")
-_IDENTITY = np.tile(np.eye(4, dtype=np.float32)[:3].reshape(1, 12), (1, 1))
 
 
 class HdrRenderer:
@@ -55,9 +53,8 @@ class HdrRenderer:
         self.ctx = ctx
         self.size = size
         self.scale = REFLECTION_SCALE[reflection]
-        self.geometry = GeometryCache(ctx)
-        self.textures = TextureCache(ctx, load, gamma)
-        self._surface = programs.get("gpu/shaders/gbuffer.vert", "gpu/shaders/gbuffer.frag")
+        textures = TextureCache(ctx, load, gamma)
+        self.surfaces = SurfacePass(ctx, programs, textures, self.scale)
         self._lights = {
             rows: programs.get(
                 "gpu/shaders/light.vert",
@@ -72,7 +69,6 @@ class HdrRenderer:
         depth = ctx.depth_texture(size)
         self._gbuffer = ctx.framebuffer(self._layers, depth)
         self._frame = ctx.framebuffer([self.hdr], depth)
-        self._empty = ctx.vertex_array(self._lights[2], [])
         self._vaos = {rows: ctx.vertex_array(p, []) for rows, p in self._lights.items()}
 
     @property
@@ -84,7 +80,6 @@ class HdrRenderer:
         """Draw one moment; returns ``hdr``."""
         self.draw_surfaces(scene)
         self.add_lights(scene)
-        self.geometry.next_frame()
         return self.hdr
 
     def read(self) -> npt.NDArray[np.float32]:
@@ -98,7 +93,7 @@ class HdrRenderer:
 
     def draw_surfaces(self, scene: RenderScene) -> None:
         """Step one: G-buffer, and emission plus ambient in the frame."""
-        ctx, camera = self.ctx, scene.camera
+        ctx = self.ctx
         self._gbuffer.use()
         self._gbuffer.clear(depth=1.0)
         if any(scene.background):
@@ -107,22 +102,7 @@ class HdrRenderer:
             self._gbuffer.use()
         ctx.enable_only(moderngl.DEPTH_TEST)
         ctx.depth_func = "<"
-        program = self._surface
-        rotation = np.eye(4)
-        rotation[:3, :3] = camera.rotation()
-        program["view_projection"].write(
-            np.ascontiguousarray(rotation @ camera.projection(), np.float32)
-        )
-        _set(program, "ambient", scene.ambient)
-        _set(program, "lambert_scale", self.scale)
-        _set(program, "toward_eye", _toward_eye(camera))
-        bound = -1
-        for draw in sorted(scene.draws, key=lambda d: d.material):
-            material = scene.materials[draw.material]
-            if draw.material != bound:
-                self._use_material(material)
-                bound = draw.material
-            self._draw(draw, material, camera)
+        self.surfaces.draw(scene)
 
     def add_lights(self, scene: RenderScene) -> None:
         """Step two: every light on every pixel that shows a surface."""
@@ -141,99 +121,20 @@ class HdrRenderer:
             program = self._lights[rows]
             for unit, name in enumerate(("g_position", "g_normal", "g_diffuse", "g_specular")):
                 self._layers[unit].use(unit)
-                _set(program, name, unit)
+                set_used(program, name, unit)
             table.use(4)
-            _set(program, "lights", 4)
-            _set(program, "first", 0)
-            _set(program, "count", count)
-            _set(program, "lambert_scale", self.scale)
-            _set(program, "toward_eye", _toward_eye(scene.camera))
+            set_used(program, "lights", 4)
+            set_used(program, "first", 0)
+            set_used(program, "count", count)
+            set_used(program, "lambert_scale", self.scale)
+            set_used(program, "toward_eye", _toward_eye(scene.camera))
             batches = -(-count // _BATCH[rows])
             self._vaos[rows].render(moderngl.TRIANGLES, vertices=3, instances=batches)
             table.release()
         self._frame.depth_mask = True
         ctx.enable_only(moderngl.NOTHING)
 
-    def _draw(self, draw: Draw, material: Material, camera: Camera) -> None:
-        ctx, program = self.ctx, self._surface
-        uploaded = self.geometry.get(draw.geometry, material.uv_sets(), material.vertex_color)
-        rows = instance_rows(draw, camera)
-        flipped = mirrored(draw)
-        present = [
-            (layout, name)
-            for layout, name in zip(uploaded.layout.split(), uploaded.attributes, strict=True)
-        ]
-        layout = " ".join(
-            part if name in program else f"{int(part[0]) * 4}x" for part, name in present
-        )
-        names = [name for _, name in present if name in program]
-        _set(program, "double_sided", draw.double_sided)
-        colored = "in_color" in uploaded.attributes
-        for mirror in (False, True):
-            chosen = rows[flipped == mirror]
-            if len(chosen) == 0:
-                continue
-            instances = ctx.buffer(chosen)
-            content = [
-                (uploaded.buffer, layout, *names),
-                (instances, "4f 4f 4f /i", "in_row0", "in_row1", "in_row2"),
-            ]
-            white = None
-            if not colored and "in_color" in program:
-                white = ctx.buffer(np.ones(3, np.float32))
-                content.append((white, "3f /r", "in_color"))
-            vao = ctx.vertex_array(program, content)
-            _set(program, "handedness", -1.0 if mirror else 1.0)
-            if draw.double_sided:
-                ctx.disable(moderngl.CULL_FACE)
-            else:
-                ctx.enable(moderngl.CULL_FACE)
-            ctx.front_face = "cw" if mirror else "ccw"
-            vao.render(moderngl.TRIANGLES, uploaded.vertices, instances=len(chosen))
-            for thing in (vao, instances, white):
-                if thing is not None:
-                    thing.release()
-
-    def _use_material(self, material: Material) -> None:
-        program = self._surface
-        for name in ("diffuse", "specular", "shininess", "metallic", "emission", "opacity"):
-            _set(program, name, getattr(material, name))
-        _set(program, "opacity_threshold", material.opacity_threshold)
-        uv_sets = material.uv_sets()
-        for unit, name in enumerate(_MAPS):
-            self._use_map(name, unit, getattr(material, name), uv_sets)
-
-    def _use_map(self, name: str, unit: int, use: TextureUse | None, uv_sets: list[str]) -> None:
-        program = self._surface
-        uploaded = None if use is None else self.textures.get(use.texture)
-        _set(program, f"{name}.used", use is not None)
-        _set(program, name.replace("_map", "_image"), unit)
-        if use is None:
-            return
-        scale, bias = use.scale, use.bias
-        (a, b, c, d, e, f) = use.matrix
-        if uploaded is None:  # the texture's fallback, through the same scale and bias
-            bias = tuple(fb * s + o for fb, s, o in zip(use.fallback, scale, bias, strict=True))  # type: ignore[assignment]
-            scale = (0.0, 0.0, 0.0, 0.0)
-        else:
-            (ks, kt), (os, ot) = uploaded.scale, uploaded.offset
-            a, b, c = ks * a, ks * b, ks * c + os
-            d, e, f = kt * d, kt * e, kt * f + ot
-            uploaded.texture.use(unit)
-        _set(program, f"{name}.uv", min(uv_sets.index(use.uv_set), 3))
-        _set(program, f"{name}.u", (a, b, c))
-        _set(program, f"{name}.v", (d, e, f))
-        _set(program, f"{name}.scale", scale)
-        _set(program, f"{name}.bias", bias)
-        _set(program, f"{name}.channel", use.channel)
-
-
-def _set(program: moderngl.Program, name: str, value: object) -> None:
-    """Set a uniform that the compiler may have found unused and removed."""
-    member = program.get(name, None)
-    if member is not None:
-        member.value = value
-
 
 def _toward_eye(camera: Camera) -> tuple[float, float, float]:
+    """Unit vector to an orthographic camera; zero for one that stands somewhere."""
     return camera.back if camera.orthographic else (0.0, 0.0, 0.0)

@@ -12,6 +12,7 @@ points scattered into a blended R32F row 61 ms.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import moderngl
@@ -66,7 +67,7 @@ class Measurer:
         if need == Need.PERCENTILES:
             # The middle of a bin may lie past the extremes, which are exact.
             p01, p99 = (min(max(p, minimum), maximum) for p in self._percentiles(hdr, (1, 99)))
-        return Statistics(2.0 ** float(logs / number), minimum, maximum, average, p01, p99)
+        return Statistics(math.exp2(logs / number), minimum, maximum, average, p01, p99)
 
     def _percentiles(self, hdr: moderngl.Texture, percents: tuple[int, ...]) -> list[float]:
         width, height = hdr.size

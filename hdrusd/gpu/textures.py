@@ -63,6 +63,7 @@ class TextureCache:
         self.ctx = ctx
         self.load = load
         self.gamma = gamma
+        self.blank = ctx.texture((1, 1), 4, bytes(4))  # where there is no image
         self._kept: dict[TextureRef, Uploaded | None] = {}
 
     def get(self, ref: TextureRef) -> Uploaded | None:

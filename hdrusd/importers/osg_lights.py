@@ -17,8 +17,8 @@ import math
 from typing import Any, Literal
 
 from hdrusd.importers.osg_state import RenderState
-from hdrusd.importers.osg_text import Document, Statement
-from hdrusd.legacy.scene import RGB, Light, Vec3
+from hdrusd.importers.osg_text import Document, Statement, listed, triple
+from hdrusd.legacy.scene import Light, Vec3
 from hdrusd.report import Kind
 
 #: Field names in both formats, folded, to the values of osg::Light's constructor.
@@ -45,7 +45,7 @@ class LightReader:
         self.document = document
         self.lights = lights
         self._known: dict[tuple[int, bool], int] = {}
-        self._numbers: dict[int, int] = {}
+        self._numbers: dict[int, list[int]] = {}
 
     def read(self, source: Statement, name: str, state: RenderState) -> int | None:
         """The number of a LightSource's light; None, with a finding, where it has none."""
@@ -59,8 +59,8 @@ class LightReader:
         key = id(place), enabled
         if key not in self._known:
             self._known[key] = len(self.lights)
+            self._numbers.setdefault(number, []).append(len(self.lights))
             self.lights.append(self._light(place, name, number, enabled))
-            self._shared_number(place, number)
         return self._known[key]
 
     def _light(self, place: Statement, name: str, number: int, enabled: bool) -> Light:
@@ -76,7 +76,7 @@ class LightReader:
             values[key] = found
         missing = [key for key in _COLOURS if key in left_out]
         if missing:
-            text = f"{', '.join(missing)} left out; read as {_listed(values[missing[0]])}"
+            text = f"{', '.join(missing)} left out; read as {listed(values[missing[0]])}"
             document.add(Kind.ASSUMED, "osg-light-defaults", place, name, text)
         kind = self._kind(place, name, values)
         extras: dict[str, Any] = {"light_number": number}
@@ -89,9 +89,9 @@ class LightReader:
             kind,
             position,
             direction,
-            _rgb(values["ambient"]),
-            _rgb(values["diffuse"]),
-            _rgb(values["specular"]),
+            triple(values["ambient"]),
+            triple(values["diffuse"]),
+            triple(values["specular"]),
             (
                 values["constantattenuation"][0],
                 values["linearattenuation"][0],
@@ -127,9 +127,9 @@ class LightReader:
         """
         x, y, z, w = values["position"]
         if kind == "directional":
-            travel, position = (-x, -y, -z), (0.0, 0.0, 0.0)
+            travel, position = (0.0 - x, 0.0 - y, 0.0 - z), (0.0, 0.0, 0.0)
         else:
-            travel = values["direction"][0], values["direction"][1], values["direction"][2]
+            travel = triple(values["direction"])
             position = (x / w, y / w, z / w) if w else (x, y, z)
         length = math.hypot(*travel)
         if not 0.0 < length < math.inf or not all(map(math.isfinite, position)):
@@ -140,56 +140,59 @@ class LightReader:
             position = position if all(map(math.isfinite, position)) else (0.0, 0.0, 0.0)
         return position, (travel[0] / length, travel[1] / length, travel[2] / length)
 
-    def _shared_number(self, place: Statement, number: int) -> None:
-        """OpenGL has one light to a number; a database means all of them."""
-        first = self._numbers.setdefault(number, len(self.lights) - 1)
-        if first != len(self.lights) - 1:
-            text = f"GL_LIGHT{number} is {self.lights[first].name} too; all are kept"
-            name = self.lights[-1].name
-            self.document.add(Kind.ASSUMED, "osg-light-number", place, name, text)
+    def finish(self) -> None:
+        """Say which lights share a number: OpenGL would show the last, a database means all."""
+        for number, lights in self._numbers.items():
+            if len(lights) > 1:
+                first, second = (self.lights[light] for light in lights[:2])
+                text = (
+                    f"{len(lights)} lights are GL_LIGHT{number}, as {first.name} is; all are kept"
+                )
+                report = self.document.report
+                report.add(Kind.ASSUMED, "osg-light-number", second.source, second.name, text)
 
-    def light_points(self, node: Statement, name: str) -> dict[str, Any]:
-        """The light points of an osgSim::LightPointNode as extras of its node, and a finding."""
-        document = self.document
-        listed = document.field(node, "lightpointlist")
-        places = listed if listed is not None else node
-        points = []
-        for place in places.block.statements if places.block is not None else []:
-            if place.key != "lightpoint":
-                continue
-            on, intensity, radius = self._attributes(place)
-            points.append(
-                {
-                    "on": on,
-                    "position": document.numbers(place, 3, "position") or (0.0, 0.0, 0.0),
-                    "color": document.numbers(place, 4, "color") or (1.0, 1.0, 1.0, 1.0),
-                    "intensity": intensity,
-                    "radius": radius,
-                }
-            )
-        if not points:
-            return {}
-        colours = sorted({point["color"] for point in points})
-        shown = "; ".join(_listed(colour) for colour in colours[:4])
-        more = f" and {len(colours) - 4} more" if len(colours) > 4 else ""
-        text = (
-            f"light points have no home yet: {len(points)} of colour {shown}{more}; "
-            "kept as notes of their node"
+
+def light_points(document: Document, node: Statement, name: str) -> dict[str, Any]:
+    """The light points of an osgSim::LightPointNode as extras of its node, and a finding."""
+    found = document.field(node, "lightpointlist")
+    holder = found if found is not None else node
+    points: list[dict[str, Any]] = []
+    for place in holder.block.statements if holder.block is not None else []:
+        if place.key != "lightpoint":
+            continue
+        on, intensity, radius = _attributes(document, place)
+        points.append(
+            {
+                "on": on,
+                "position": document.numbers(place, 3, "position") or (0.0, 0.0, 0.0),
+                "color": document.numbers(place, 4, "color") or (1.0, 1.0, 1.0, 1.0),
+                "intensity": intensity,
+                "radius": radius,
+            }
         )
-        document.add(Kind.DROPPED, "osg-light-points", node, name, text)
-        return {"light_points": tuple(points)}
+    if not points:
+        return {}
+    colours = sorted({point["color"] for point in points})
+    shown = "; ".join(listed(colour) for colour in colours[:4])
+    more = f" and {len(colours) - 4} more" if len(colours) > 4 else ""
+    text = (
+        f"light points have no home yet: {len(points)} of colour {shown}{more}; "
+        "kept as notes of their node"
+    )
+    document.add(Kind.DROPPED, "osg-light-points", node, name, text)
+    return {"light_points": tuple(points)}
 
-    def _attributes(self, place: Statement) -> tuple[bool, float, float]:
-        """On, intensity, radius. .osgt has ``Attributes TRUE 1 0.4 0.05``, the 1 being a blend mode."""
-        document = self.document
-        found = document.field(place, "attributes")
-        if found is None:
-            on = document.word(place, "ison") != "FALSE"
-            intensity = document.number(place, 1.0, "intensity")
-            return on, intensity, document.number(place, 1.0, "radius")
-        values = [_finite(word, 1.0) for word in found.words[3:5]]
-        values += [1.0] * (2 - len(values))
-        return found.words[1:2] != ["FALSE"], values[0], values[1]
+
+def _attributes(document: Document, place: Statement) -> tuple[bool, float, float]:
+    """On, intensity, radius; ``Attributes TRUE 1 0.4 0.05`` in .osgt, 1 being a blend mode."""
+    found = document.field(place, "attributes")
+    if found is None:
+        on = document.word(place, "ison") != "FALSE"
+        intensity = document.number(place, 1.0, "intensity")
+        return on, intensity, document.number(place, 1.0, "radius")
+    values = [_finite(word, 1.0) for word in found.words[3:5]]
+    values += [1.0] * (2 - len(values))
+    return found.words[1:2] != ["FALSE"], values[0], values[1]
 
 
 def _finite(word: str, default: float) -> float:
@@ -198,11 +201,3 @@ def _finite(word: str, default: float) -> float:
     except ValueError:
         return default
     return value if math.isfinite(value) else default
-
-
-def _rgb(values: tuple[float, ...]) -> RGB:
-    return values[0], values[1], values[2]
-
-
-def _listed(values: tuple[float, ...]) -> str:
-    return "(" + ", ".join(f"{value:g}" for value in values) + ")"

@@ -24,8 +24,8 @@ from typing import Any, Literal
 
 from hdrusd.errors import SourceRef
 from hdrusd.importers.osg_state import RenderState
-from hdrusd.importers.osg_text import Document, Statement
-from hdrusd.importers.osg_textures import TextureReader, has_alpha
+from hdrusd.importers.osg_text import Document, Statement, listed, triple
+from hdrusd.importers.osg_textures import TextureReader
 from hdrusd.legacy.scene import RGB, Material, Texture
 from hdrusd.report import Kind
 
@@ -80,10 +80,8 @@ class MaterialReader:
         alpha_mode, cutoff = self._transparency(state, made.name)
         diffuse_map, left_out, extras = self._texture(state, made.name)
         opacity_map = None
-        if alpha_mode != "opaque" and diffuse_map is not None and not diffuse_map.image.missing:
-            opacity_map = (
-                replace(diffuse_map, channel="a") if has_alpha(diffuse_map.image) else None
-            )
+        if alpha_mode != "opaque" and diffuse_map and self.textures.has_alpha(diffuse_map.image):
+            opacity_map = replace(diffuse_map, channel="a")
         stem = ""
         if diffuse_map is not None:
             stem = PurePosixPath(diffuse_map.image.name.replace("\\", "/")).stem
@@ -119,7 +117,7 @@ class MaterialReader:
         document = self.document
         if place is None:
             white = colored or not lit
-            diffuse = _WHITE if white else _COLOURS["diffuse"][1][:3]
+            diffuse = _WHITE if white else triple(_COLOURS["diffuse"][1])
             source = SourceRef(document.file)
             return Material("", source, diffuse=diffuse, defaults=_FIELDS), colored
         name = document.name(place)
@@ -139,21 +137,21 @@ class MaterialReader:
         if colored and not replaces:
             text = f"ColorMode {mode}: vertex colours are not used for the diffuse colour; dropped"
             document.add(Kind.DROPPED, "osg-vertex-colours", place, name, text)
-        diffuse = _rgb(colours["diffuse"])
+        diffuse = triple(colours["diffuse"])
         if colored and replaces:
-            text = f"vertex colours replace the diffuse colour {_listed(colours['diffuse'])}"
+            text = f"vertex colours replace the diffuse colour {listed(colours['diffuse'])}"
             document.add(Kind.REPLACED, "osg-vertex-colours", place, name, text)
             diffuse, alpha = _WHITE, 1.0
         made = Material(
             name,
             document.ref(place),
-            ambient=_rgb(colours["ambient"]),
+            ambient=triple(colours["ambient"]),
             diffuse=diffuse,
-            specular=_rgb(colours["specular"]),
-            emission=_rgb(colours["emission"]),
+            specular=triple(colours["specular"]),
+            emission=triple(colours["emission"]),
             shininess=found.get("shininess", (0.0,))[0],
             alpha=min(max(alpha, 0.0), 1.0),
-            defaults=_FIELDS - found.keys(),
+            defaults=_FIELDS.difference(found),
             extras={} if mode == "OFF" else {"color_mode": mode},
         )
         return made, colored and replaces
@@ -183,7 +181,7 @@ class MaterialReader:
                 sides.pop("BACK", None)
         front = sides.get("FRONT")
         if "BACK" in sides and sides["BACK"] != front:
-            text = f"{keys[0]} of the back face is {_listed(sides['BACK'])}; the front's is used"
+            text = f"{keys[0]} of the back face is {listed(sides['BACK'])}; the front's is used"
             self.document.add(Kind.DROPPED, "osg-back-face", place, name, text)
         return front
 
@@ -290,14 +288,6 @@ def _floats(words: list[str], width: int) -> tuple[float, ...] | None:
     if width == 4 and len(values) == 3:
         values.append(1.0)
     return tuple(values) if len(values) == width and all(map(math.isfinite, values)) else None
-
-
-def _rgb(values: tuple[float, ...]) -> RGB:
-    return values[0], values[1], values[2]
-
-
-def _listed(values: tuple[float, ...]) -> str:
-    return "(" + ", ".join(f"{value:g}" for value in values) + ")"
 
 
 def _comparable(value: Any) -> Any:

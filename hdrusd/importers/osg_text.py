@@ -53,6 +53,11 @@ class Statement:
         return fold(self.words[0]) if self.words else ""
 
     @property
+    def label(self) -> str:
+        """The first word as it stands, for messages."""
+        return self.words[0] if self.words else "{"
+
+    @property
     def class_name(self) -> str:
         """The first word without its library: ``osg::Group`` is a ``Group``."""
         return self.words[0].rpartition("::")[2] if self.words else ""
@@ -95,6 +100,16 @@ class Block:
 def fold(word: str) -> str:
     """The name of a field as both formats have it: ``wrap_s`` and ``WRAP_S`` are ``wraps``."""
     return word.replace("_", "").lower()
+
+
+def triple(values: tuple[float, ...]) -> tuple[float, float, float]:
+    """The first three numbers: a colour or a vector."""
+    return values[0], values[1], values[2]
+
+
+def listed(values: tuple[float, ...]) -> str:
+    """Numbers as messages show them."""
+    return "(" + ", ".join(f"{value:g}" for value in values) + ")"
 
 
 def _number(word: str) -> float:
@@ -148,7 +163,11 @@ class Document:
         """The first field of ``owner`` under any of the folded names."""
         if owner.block is None:
             return None
-        return next((f for key in keys if (f := owner.block.field(key)) is not None), None)
+        for key in keys:
+            found = owner.block.field(key)
+            if found is not None:
+                return found
+        return None
 
     def word(self, owner: Statement, *keys: str) -> str | None:
         """The second word of a field, for names and enumerations."""
@@ -172,7 +191,7 @@ class Document:
                 Kind.INVALID,
                 "osg-number",
                 found,
-                " ".join(found.words[:1]),
+                found.label,
                 f"want {count} finite numbers; the default stands",
             )
             return None
@@ -242,14 +261,17 @@ class _Parser:
                 self._close()
         if self.stack:
             raise self._error(
-                f"{' '.join(self.stack[-1][0].words[:2]) or 'block'}: not closed; want }}",
+                f"{self.stack[-1][0].label}: block not closed; want }}",
                 self.stack[-1][0].line,
             )
 
     def _words(self, text: bytes) -> None:
         if self.current is None and text.startswith(b"#"):
             return
-        words = [_decoded(word) for word in text.split()]
+        if text.isascii():
+            words = list(map(bytes.decode, text.split()))
+        else:
+            words = [_decoded(word) for word in text.split()]
         self._append(words)
         if words[0] == "UniqueID" and len(words) == 2 and self.stack:
             self.document.definitions.setdefault(words[1], self.stack[-1][0])

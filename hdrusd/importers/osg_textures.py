@@ -48,9 +48,10 @@ _FORMATS: dict[int, tuple[int, tuple[int | None, ...]]] = {
 }
 #: OpenGL's numbers of S3TC formats to the four letters of a DDS file and the bytes of a block.
 _S3TC = {33776: (b"DXT1", 8), 33777: (b"DXT1", 8), 33778: (b"DXT3", 16), 33779: (b"DXT5", 16)}
+_DXT1_OPAQUE = 33776  # GL_COMPRESSED_RGB_S3TC_DXT1_EXT
 _UNSIGNED_BYTE = 5121
 #: Files that hold no alpha whatever they hold.
-_OPAQUE_SUFFIXES = {".jpg", ".jpeg", ".int"}
+_NO_ALPHA = {".jpg", ".jpeg", ".int"}
 
 
 @dataclass(slots=True)
@@ -60,6 +61,7 @@ class TextureReader:
     document: Document
     resolver: Resolver
     _images: dict[str, Image] = field(default_factory=dict)
+    _opaque: set[int] = field(default_factory=set)  # images whose format has no alpha
 
     def read(
         self, texture: Statement, unit: int, environment: Statement | None, matrix: Statement | None
@@ -89,6 +91,15 @@ class TextureReader:
         left = {"wrap_s": wrap_s, "wrap_t": wrap_t}
         return made, frozenset(name for name, wrap in left.items() if wrap is None)
 
+    def has_alpha(self, image: Image) -> bool:
+        """False where an image certainly has no alpha; one that has none reads as full."""
+        if image.missing or id(image) in self._opaque:
+            return False
+        if image.pixels is not None:
+            return image.pixels.shape[2] in (2, 4)
+        path = image.name if image.path is None else image.path.name
+        return image.data is not None or PurePosixPath(path).suffix.lower() not in _NO_ALPHA
+
     def name(self, texture: Statement) -> str:
         """The file name that a texture gives, without looking for the file."""
         named = self.document.field(texture, "file")
@@ -111,7 +122,7 @@ class TextureReader:
             document.add(Kind.MISSING, "osg-image", texture, document.name(texture), text)
             return None
         name = document.word(holder, "filename") or ""
-        if "ImageSequence" in (document.word(holder, "classname") or holder.words[0]):
+        if "ImageSequence" in (document.word(holder, "classname") or holder.label):
             listed = document.field(holder, "filenames", "filenamelist")
             files = listed.block.statements if listed is not None and listed.block else []
             name = name or (files[0].words[0] if files and files[0].words else "")
@@ -127,7 +138,7 @@ class TextureReader:
     def _file(self, name: str, place: Statement) -> Image:
         if name not in self._images:
             source = self.document.ref(place)
-            path = self.resolver.find(name, source, thing=name)
+            path = self.resolver.find(name, source)
             self._images[name] = Image(name, source, path=path)
         return self._images[name]
 
@@ -137,7 +148,10 @@ class TextureReader:
         try:
             width, height, pixel_format, data = self._data(place)
             if pixel_format in _S3TC:
-                return Image(name, source, data=_dds(width, height, pixel_format, data))
+                made = Image(name, source, data=_dds(width, height, pixel_format, data))
+                if pixel_format == _DXT1_OPAQUE:
+                    self._opaque.add(id(made))
+                return made
             packing = int(self.document.number(place, 1.0, "packing"))
             return Image(name, source, pixels=_pixels(width, height, pixel_format, packing, data))
         except ValueError as error:
@@ -154,7 +168,8 @@ class TextureReader:
             raise ValueError(f"{width} x {height} x {depth}; want one layer, {limit} pixels")
         pixel_format = int(self.document.number(place, 0.0, "pixelformat"))
         kind = int(self.document.number(place, _UNSIGNED_BYTE, "datatype"))
-        if kind != _UNSIGNED_BYTE or pixel_format not in _FORMATS.keys() | _S3TC.keys():
+        plain = pixel_format in _FORMATS and kind == _UNSIGNED_BYTE
+        if not plain and pixel_format not in _S3TC:  # whose type is written as the format or 0
             raise ValueError(f"format {pixel_format} of type {kind}; want 8-bit or S3TC")
         data = self.document.field(place, "data")
         strings = [] if data is None or data.block is None else data.block.statements
@@ -185,10 +200,11 @@ class TextureReader:
                 values = tuple(matrix.block.numbers()[:16].tolist())
                 values = values if len(values) == 16 and all(map(math.isfinite, values)) else None
         suffix = PurePosixPath(image.name if image.path is None else image.path.name).suffix
-        from_top = image.data is not None or (image.pixels is None and suffix.lower() == ".dds")
-        if from_top:
-            text = "rows run from the top, as OpenSceneGraph shows them; t is turned over"
+        a_file = image.data is None and image.pixels is None and suffix.lower() == ".dds"
+        if a_file:
+            text = "OpenSceneGraph does not turn a DDS over; t runs down for it"
             self.document.add(Kind.ASSUMED, "osg-dds-rows", texture, image.name, text)
+        from_top = a_file or image.data is not None
         try:
             return uv_transform(values or _IDENTITY, from_top=from_top)
         except ValueError as error:
@@ -198,14 +214,6 @@ class TextureReader:
 
 
 _IDENTITY = tuple(np.eye(4).ravel().tolist())
-
-
-def has_alpha(image: Image) -> bool:
-    """False where an image certainly has no alpha; one that has none reads as full."""
-    if image.pixels is not None:
-        return image.pixels.shape[2] in (2, 4)
-    path = image.name if image.path is None else image.path.name
-    return PurePosixPath(path).suffix.lower() not in _OPAQUE_SUFFIXES
 
 
 def uv_transform(matrix: tuple[float, ...], *, from_top: bool = False) -> UVTransform | None:

@@ -16,7 +16,7 @@ from typing import Literal
 
 import numpy as np
 
-from hdrusd.importers.osg_text import Document, Doubles, Statement
+from hdrusd.importers.osg_text import Document, Doubles, Statement, listed, triple
 from hdrusd.legacy.scene import TRS, Channel, Vec3
 from hdrusd.report import Kind
 
@@ -97,10 +97,10 @@ class TransformReader:
             document.add(Kind.INVALID, "osg-rotation", node, name, text)
             turn, length = (0.0, 0.0, 0.0, 1.0), 1.0
         x, y, z, w = (part / length for part in turn)
-        made = TRS(_vec3(position), (x, y, z, w), _vec3(scale))
+        made = TRS(triple(position), (x, y, z, w), triple(scale))
         pivot = document.numbers(node, 3, "pivotpoint") or _ORIGIN
         if pivot != _ORIGIN:  # translate(-pivot) scale rotate translate
-            matrix = np.diag((*scale, 1.0)) @ _rotation(made.rotation)
+            matrix = np.diag((*scale, 1.0)) @ rotation_matrix(made.rotation)
             matrix[3, :3] = position
             with np.errstate(over="ignore", invalid="ignore"):
                 matrix[3, :3] -= np.array(pivot) @ matrix[:3, :3]
@@ -141,7 +141,7 @@ class TransformReader:
         current = np.eye(4)
         current[3, :3] = document.numbers(node, 3, "currenttranslate") or _ORIGIN
         for letter in order if sorted(order) == ["H", "P", "R"] else "PRH":
-            current = _rotation(turns[letter]) @ current
+            current = rotation_matrix(turns[letter]) @ current
         current = np.diag((*(scale if any(scale) else _ONE), 1.0)) @ current
         if put is not None:
             matrix = np.array(put, dtype=np.float64).reshape(4, 4)
@@ -174,9 +174,9 @@ class TransformReader:
                 channels = self._channels(callback, name, scaled=node.class_name != "CameraView")
                 pivot = document.numbers(callback, 3, "pivotpoint") or _ORIGIN
                 if pivot != _ORIGIN and channels:
-                    text = f"pivot {pivot[0]:g} {pivot[1]:g} {pivot[2]:g}: kept as an inner node"
+                    text = f"pivot {listed(pivot)}: kept as an inner node"
                     document.add(Kind.REPLACED, "osg-animation-pivot", callback, name, text)
-                found = channels, _vec3(pivot)
+                found = channels, triple(pivot)
         return found
 
     def _callbacks(self, node: Statement) -> Iterator[Statement]:
@@ -244,16 +244,16 @@ class TransformReader:
     def _control_points(self, path: Statement) -> Doubles:
         """Rows of time, position, rotation, scale. NaN in what a point leaves out or breaks."""
         document = self.document
-        listed = document.field(path, "controlpoints", "timecontrolpointmap")
-        if listed is None or listed.block is None:
+        holder = document.field(path, "controlpoints", "timecontrolpointmap")
+        if holder is None or holder.block is None:
             return np.zeros((0, 11))
-        if listed.key == "controlpoints":
-            numbers = listed.block.numbers()
+        if holder.key == "controlpoints":
+            numbers = holder.block.numbers()
             if len(numbers) % 11:
                 text = (
                     f"{len(numbers)} numbers; want 11 for each control point; the rest is left out"
                 )
-                document.add(Kind.INVALID, "osg-animation", listed, "", text)
+                document.add(Kind.INVALID, "osg-animation", holder, "", text)
             return numbers[: len(numbers) // 11 * 11].reshape(-1, 11)
         rows = [
             (
@@ -262,7 +262,7 @@ class TransformReader:
                 *_or_nan(document.numbers(s, 4, "rotation"), 4),
                 *_or_nan(document.numbers(s, 3, "scale"), 3),
             )
-            for s in listed.block.statements
+            for s in holder.block.statements
             if s.key == "time"
         ]
         return np.array(rows, dtype=np.float64).reshape(-1, 11)
@@ -279,11 +279,7 @@ def _or_nan(values: tuple[float, ...] | None, count: int) -> tuple[float, ...]:
     return (math.nan,) * count if values is None else values
 
 
-def _vec3(values: tuple[float, ...]) -> Vec3:
-    return values[0], values[1], values[2]
-
-
-def _rotation(turn: tuple[float, float, float, float]) -> Doubles:
+def rotation_matrix(turn: tuple[float, float, float, float]) -> Doubles:
     """The (4, 4) row-vector matrix of a unit quaternion (x, y, z, w)."""
     x, y, z, w = turn
     return np.array(

@@ -20,7 +20,9 @@ float cone_factor(float cosine, float inner, float outer, float exponent)
     float theta = angle_from_cosine(cosine);
     float t = clamp((theta - inner) / max(outer - inner, 1e-6), 0.0, 1.0);
     float fade = 1.0 - t * t * (3.0 - 2.0 * t);
-    return fade * pow(max(abs(cosine), 1e-9), exponent);
+    if (exponent > 0.0)  // a power costs as much as all the rest of a light
+        fade *= pow(max(abs(cosine), 1e-9), exponent);
+    return fade;
 }
 
 // From a surface point (m) to the light, unnormalised; w 1: place, w 0: unit direction.
@@ -29,11 +31,9 @@ vec3 light_vector(vec3 position, float w, vec3 point)
     return position - point * w;
 }
 
-// lux per candela: cos(theta) / d^2; radius in m bounds it inside the lamp.
-float illuminance(vec3 to_light, vec3 normal, float radius)
+// lux per candela: cos(theta) / d^2, from the cosine and the square of the distance (m2);
+// radius in m bounds it inside the lamp.
+float illuminance(float cosine, float d2, float radius)
 {
-    float d2 = dot(to_light, to_light);
-    float d = sqrt(max(d2, 1e-20));
-    float cosine = max(dot(to_light, normal) / d, 0.0);
-    return cosine / max(max(d2, radius * radius), 1e-20);
+    return max(cosine, 0.0) / max(d2, radius * radius);
 }

@@ -84,13 +84,11 @@ def light_vector(position: Array, w: Array, point: Array) -> Array:
     return np.asarray(position - point * np.asarray(w)[..., None])
 
 
-def illuminance(to_light: Array, normal: Array, radius: Array) -> Array:
+def illuminance(cosine: Array, d2: Array, radius: Array) -> Array:
     """cos(theta) / d^2 of equation 1: lux per candela (per lux for a distant light).
 
-    ``to_light``: from ``light_vector``; ``normal``: unit; ``radius``: m, within
-    which the inverse square is not followed.
+    ``cosine``: between the normal and the way to the light; ``d2``: the square of
+    the distance, m2, above 0; ``radius``: m, within which the inverse square is not
+    followed.
     """
-    d2 = np.sum(to_light * to_light, axis=-1)
-    d = np.sqrt(np.maximum(d2, 1e-20))
-    cosine = np.maximum(np.sum(to_light * normal, axis=-1) / d, 0.0)
-    return np.asarray(cosine / np.maximum(np.maximum(d2, radius * radius), 1e-20))
+    return np.asarray(np.maximum(cosine, 0.0) / np.maximum(d2, radius * radius))

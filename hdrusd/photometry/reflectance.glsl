@@ -6,6 +6,12 @@ vec3 lambert(vec3 reflectance, vec3 lux, float scale)
     return reflectance * lux * scale;
 }
 
+// N.H from N.L, N.V and L.V (Blinn 1977): |L + V|^2 = 2 + 2 L.V for unit vectors.
+float half_cosine(float nl, float nv, float lv)
+{
+    return (nl + nv) * inversesqrt(max(2.0 + 2.0 * lv, 1e-12));
+}
+
 // cd/m2 per lux and unit of specular reflectance, from N.H; scale as above.
 float blinn_phong(float cosine, float shininess, float scale)
 {

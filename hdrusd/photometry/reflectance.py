@@ -28,6 +28,14 @@ def lambert(reflectance: Array, lux: Array, scale: float) -> Array:
     return np.asarray(reflectance * lux * scale)
 
 
+def half_cosine(nl: Array, nv: Array, lv: Array) -> Array:
+    """N.H from N.L, N.V and L.V, H being halfway between light and eye (Blinn 1977).
+
+    (N.L + N.V) / |L + V|, with |L + V|^2 = 2 + 2 L.V for unit vectors.
+    """
+    return np.asarray((nl + nv) / np.sqrt(np.maximum(2.0 + 2.0 * lv, 1e-12)))
+
+
 def blinn_phong(cosine: Array, shininess: Array, scale: float) -> Array:
     """Luminance per lux and unit of specular reflectance, from N.H: sr^-1.
 

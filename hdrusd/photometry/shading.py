@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.photometry.light import cone_factor, illuminance, light_vector
-from hdrusd.photometry.reflectance import blinn_phong, lambert
+from hdrusd.photometry.reflectance import blinn_phong, half_cosine, lambert
 from hdrusd.scene import NO_CONE
 
 Array = npt.NDArray[Any]
@@ -37,17 +37,19 @@ def shade(
     """
     view = eye - position
     view = view / np.linalg.norm(view, axis=-1, keepdims=True)
+    nv = np.sum(normal * view, axis=-1)
     total = np.zeros(np.shape(position), np.float64)
     for light in lights:
         to_light = light_vector(light["position"], light["w"], position)
-        e = illuminance(to_light, normal, light["radius"])
-        unit = to_light / np.linalg.norm(to_light, axis=-1, keepdims=True)
+        d2 = np.maximum(np.sum(to_light * to_light, axis=-1), 1e-20)
+        unit = to_light / np.sqrt(d2)[..., None]
+        nl = np.sum(normal * unit, axis=-1)
+        e = illuminance(nl, d2, light["radius"])
         if light["outer"] < NO_CONE or light["exponent"] > 0.0:
             cosine = -np.sum(unit * light["axis"], axis=-1)
             e = e * cone_factor(cosine, light["inner"], light["outer"], light["exponent"])
         lux = light["intensity"] * np.asarray(e)[..., None]
-        half = unit + view
-        half = half / np.maximum(np.linalg.norm(half, axis=-1, keepdims=True), 1e-20)
-        lobe = blinn_phong(np.sum(normal * half, axis=-1), shininess, scale)
+        nh = half_cosine(nl, nv, np.sum(unit * view, axis=-1))
+        lobe = blinn_phong(nh, shininess, scale)
         total += lambert(diffuse, lux, scale) + specular * lux * lobe[..., None]
     return total

@@ -45,7 +45,7 @@ def ev100_from_illuminance(lux: float) -> float:
 
 def saturation_luminance(ev100: float) -> float:
     """cd/m2 that just become white: 78/(100 q) 2^EV with q = 0.65, so 1.2 x 2^EV."""
-    return 1.2 * 2.0**ev100
+    return 1.2 * math.exp2(ev100)
 
 
 def exposure(rgb: npt.ArrayLike, scale: float) -> Array:

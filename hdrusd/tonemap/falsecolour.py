@@ -25,15 +25,16 @@ def falsecolour_position(y: npt.ArrayLike, scale: float, decades: float) -> Arra
     """
     y = np.asarray(y)
     ratio = np.maximum(y / scale, 10.0**-decades)
-    return np.clip(1.0 + np.log2(ratio) * (_LOG10_2 / decades), 0.0, 1.0)
+    place: Array = np.clip(1.0 + np.log2(ratio) * (_LOG10_2 / decades), 0.0, 1.0)
+    return place
 
 
 def falsecolour_palette(v: npt.ArrayLike) -> Array:
     """Code values (..., 3) in [0, 1] for a position in [0, 1]: blue, green at 3/8, red."""
     v = np.asarray(v)
     green = np.where(v > 0.375, 1.6 - 1.6 * v, v * (8.0 / 3.0))
-    code = np.stack((1.6 * v - 0.6, green, 1.0 - v * (8.0 / 3.0)), axis=-1)
-    return np.clip(code, 0.0, 1.0)
+    code: Array = np.stack((1.6 * v - 0.6, green, 1.0 - v * (8.0 / 3.0)), axis=-1)
+    return code.clip(0.0, 1.0)
 
 
 def falsecolour(rgb: npt.ArrayLike, scale: float, decades: float) -> Array:

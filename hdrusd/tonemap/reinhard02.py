@@ -52,12 +52,12 @@ def automatic_key(log_average: float, low: float, high: float) -> float:
     lo, hi, av = math.log2(low), math.log2(high), math.log2(log_average)
     # With percentiles for low and high, the average of a few lamps in the dark is above high.
     f = min(max((2.0 * av - lo - hi) / (hi - lo), -1.0), 1.0)
-    return 0.18 * 4.0**f
+    return 0.18 * math.pow(4.0, f)
 
 
 def automatic_white(low: float, high: float) -> float:
     """Scaled luminance that becomes 1, from the range low to high in cd/m2 (2003)."""
-    return 1.5 * 2.0 ** (math.log2(high) - math.log2(low) - 5.0)
+    return 1.5 * math.exp2(math.log2(high) - math.log2(low) - 5.0)
 
 
 def _uniforms(stats: Statistics | None, params: Parameters) -> dict[str, float]:
@@ -92,7 +92,7 @@ def _needs(params: Parameters) -> Need:
 OPERATOR = Operator(
     name="reinhard02",
     title="Photographic tone reproduction, global",
-    cite="Reinhard, Stark, Shirley, Ferwerda, SIGGRAPH 2002; Reinhard, J. Graphics Tools 7(1), 2003",
+    cite="Reinhard, Stark, Shirley, Ferwerda, SIGGRAPH 2002; Reinhard, J. Graphics Tools 2003",
     parameters=(
         Parameter("key", 0.18, "", "what the log average becomes before compression, or auto"),
         Parameter(

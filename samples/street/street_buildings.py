@@ -99,7 +99,7 @@ def _storeys(kit: Kit, design: Building, rng: np.random.Generator, z: float) -> 
             bounds = (i * step, (i + 1) * step, z, z + storey.height)
             window(kit, design.wall, bounds, storey.window, _pane(rng, design.lit))
         if level > 0:
-            kit["Trim"].extrude(np.array(STRING_COURSE) + (0.0, z - 0.15), 0.0, design.width)
+            kit["Trim"].extrude(np.add(STRING_COURSE, (0.0, z - 0.15)), 0.0, design.width)
         if storey.balcony:
             balcony(kit, 0.2, design.width - 0.2, z + storey.window.sill - 0.02)
         z += storey.height
@@ -129,7 +129,9 @@ def _dormer(kit: Kit, x: float, z: float, pane: str) -> None:
              (x, back, high + 0.42)),
         ]
     )  # fmt: skip
-    trim.faces([((a - 0.08, y - 0.12, high), (b + 0.08, y - 0.12, high), (x, y - 0.12, high + 0.42))])
+    trim.faces(
+        [((a - 0.08, y - 0.12, high), (b + 0.08, y - 0.12, high), (x, y - 0.12, high + 0.42))]
+    )
 
 
 def _mansard(kit: Kit, design: Building, rng: np.random.Generator, z: float) -> float:
@@ -148,8 +150,8 @@ def _mansard(kit: Kit, design: Building, rng: np.random.Generator, z: float) -> 
     for x, flip in ((0.0, False), (w, True)):
         lower = [(x, d - 0.2, z), (x, 0.2, z), (x, 1.4, top), (x, d - 1.4, top)]
         upper = [(x, d - 1.4, top), (x, 1.4, top), (x, d / 2, ridge)]
-        kit["Ceiling"].faces([lower[::-1] if flip else lower])
-        kit["Ceiling"].faces([upper[::-1] if flip else upper])
+        kit["PartyWall"].faces([lower[::-1] if flip else lower])
+        kit["PartyWall"].faces([upper[::-1] if flip else upper])
     return ridge
 
 
@@ -193,14 +195,13 @@ def build(design: Building, seed: int, first_sign: int = 0) -> Node:
     """The building as a node without a transform, its meshes one a material."""
     kit, rng = Kit(MATERIALS), np.random.default_rng(seed)
     foot = _ground_floor(kit, design, rng, first_sign)
-    kit["Trim"].extrude(np.array(CORNICE) * (0.55, 0.6) + (0.0, foot - 0.35), 0.0, design.width)
+    kit["Trim"].extrude(
+        np.add(np.multiply(CORNICE, (0.55, 0.6)), (0.0, foot - 0.35)), 0.0, design.width
+    )
     top = _storeys(kit, design, rng, foot)
-    kit["Trim"].extrude(np.array(CORNICE) + (0.0, top), 0.0, design.width)
-    blocks = np.arange(0.4, design.width, 0.8)
-    low = np.stack((blocks - 0.1, np.full(len(blocks), -0.36), np.full(len(blocks), top + 0.24)), 1)
-    for corner in low:
-        x, y, z = (float(v) for v in corner)
-        kit["Trim"].box((x, y, z), (x + 0.2, -0.1, z + 0.18), "xXyz")
+    kit["Trim"].extrude(np.add(CORNICE, (0.0, top)), 0.0, design.width)
+    for x in np.arange(0.3, design.width - 0.2, 0.8):  # dentils below the cornice
+        kit["Trim"].box((x, -0.36, top + 0.24), (x + 0.2, -0.1, top + 0.42), "xXyz")
     if design.roof == "mansard":
         ridge = _mansard(kit, design, rng, top)
     elif design.roof == "gable":
@@ -209,7 +210,7 @@ def build(design: Building, seed: int, first_sign: int = 0) -> Node:
         ridge = _parapet(kit, design, top)
     _chimneys(kit, design, top, ridge)
     w, d, high = design.width, design.depth, top + 0.72
-    side = kit["Ceiling"]  # party walls and the back: whitewashed
+    side = kit["PartyWall"]
     walk = ARCADE_DEPTH if design.ground == "arcade" else 0.0  # one walks through the arcade
     for low_z, high_z, y in ((0.0, foot, walk), (foot, high, 0.0)):
         side.quad((0.0, d, low_z), (0.0, y, low_z), (0.0, y, high_z), (0.0, d, high_z))

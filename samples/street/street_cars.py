@@ -19,14 +19,15 @@ HEADLAMP = (0.26, 0.14)  # m, width and height of the glass
 TAIL_LAMP = (0.22, 0.20)
 HEADLAMP_HEIGHT = 0.64  # m above the road
 
-#: The beam as a cone whose upper edge is the passing beam's cut-off, 1 % below the horizon.
-BEAM_HALF_ANGLE = 7.0
-BEAM_DOWN = 7.6
+#: The passing beam as a cone whose upper edge is its cut-off, 1 % (0.6 degrees) below the
+#: horizon, and whose exponent, the highest that OpenGL takes, softens the other edges.
+BEAM_DOWN = 10.6
 _BEAM = Light(
     "Headlamp",
     "spot",
     (1.0, 0.95, 0.85),
-    cutoff=BEAM_HALF_ANGLE,
+    cutoff=10.0,
+    exponent=128.0,
     attenuation=(0.5, 0.02, 0.002),
 )
 
@@ -49,11 +50,11 @@ class Design:
 
 HATCHBACK = Design("Hatchback", 3.95, 1.72, 1.47, 0.92, 0.95, 0.30, -1.45, -1.86, 0.70)
 SALOON = Design("Saloon", 4.60, 1.80, 1.44, 0.93, 0.92, 0.20, -1.00, -1.72, 0.70)
-ESTATE = Design("Estate", 4.45, 1.84, 1.70, 1.02, 1.10, 0.55, -1.80, -2.10, 0.82)
+ESTATE = Design("Estate", 4.45, 1.84, 1.70, 1.02, 1.10, 0.55, -1.80, -2.05, 0.82)
 
 
 def _wheels(design: Design) -> tuple[float, float]:
-    """y of the rear and front axles."""
+    """The rear and front axles' y."""
     return (-design.length / 2.0 + 0.78, design.length / 2.0 - 0.82)
 
 
@@ -62,8 +63,8 @@ def _half_width(design: Design, y: Array) -> Array:
     return design.width / 2.0 * (1.0 - 0.16 * np.abs(2.0 * y / design.length) ** 8)
 
 
-def _body(paint: Shape, design: Design) -> None:
-    """The lower body: sections across the car, lofted from the tail to the nose."""
+def _sections(design: Design) -> Array:
+    """(stations, 9, 3) rings over the lower body from the left sill to the right, tail first."""
     rear, front = _wheels(design)
     half = design.length / 2.0
     arch = ARCH * np.cos(np.linspace(np.pi, 0.0, 7))
@@ -83,24 +84,39 @@ def _body(paint: Shape, design: Design) -> None:
     middle = np.maximum(0.55, low + 0.03)
     ring = [(-0.96, low), (-1.0, middle), (-0.94, belt), (-0.52, belt + 0.05), (0.0, belt + 0.07)]
     ring += [(-share, z) for share, z in ring[-2::-1]]
-    points = np.stack([np.stack((share * w, y, z), axis=1) for share, z in ring], axis=1)
+    return np.stack([np.stack((share * w, y, z), axis=1) for share, z in ring], axis=1)
+
+
+def _body(paint: Shape, design: Design) -> None:
+    """The lower body, lofted from the tail to the nose and closed at both."""
+    points = _sections(design)
     paint.grid(points)
-    for end, order in ((points[0], (0, 1)), (points[-1], (1, 0))):
-        left, right = end[:5], end[:3:-1]
-        sides = (left, right) if order == (0, 1) else (right, left)
-        a, b = sides
+    tail, nose = points[0], points[-1]
+    for a, b in ((tail[:5], tail[:3:-1]), (nose[:3:-1], nose[:5])):
         paint.faces(np.stack((a[:-1], b[:-1], b[1:], a[1:]), axis=1))
+
+
+@cache
+def bonnet(design: Design, paint: str) -> Node:
+    """What a driver sees of the own car: the body's upper side ahead of the windscreen."""
+    kit = Kit(MATERIALS)
+    points = _sections(design)
+    kit[f"CarPaint{paint}"].grid(points[points[:, 0, 1] > design.cowl - 0.4, 2:7])
+    name = f"{design.name}{paint}Bonnet"
+    return Node(name, meshes=kit.meshes(name))
 
 
 def _house_corners(design: Design) -> dict[str, tuple[float, float, float]]:
     """The glass house's right-hand corners: foot and head of windscreen and rear window."""
-    foot = 0.90 * design.width / 2.0
-    head = foot - 0.17
+    front, rear = (
+        0.92 * float(w) for w in _half_width(design, np.array((design.cowl, design.tail)))
+    )
+    head = 0.90 * design.width / 2.0 - 0.17
     return {
-        "a": (foot, design.cowl, design.belt - 0.02),
+        "a": (front, design.cowl, design.belt - 0.02),
         "b": (head, design.roof_front, design.roof - 0.05),
         "c": (head, design.roof_rear, design.roof - 0.05),
-        "d": (foot, design.tail, design.belt + 0.02),
+        "d": (rear, design.tail, design.belt + 0.02),
     }
 
 
@@ -122,17 +138,25 @@ def _house(kit: Kit, paint: Shape, design: Design) -> None:
     for side in (1.0, -1.0):
         mirror = np.array((side, 1.0, 1.0))
         for start, stop in pillars:
-            quad = [a + (d - a) * start, a + (d - a) * stop, b + (c - b) * stop, b + (c - b) * start]
-            corners = (np.array(quad) + (0.010, 0.0, 0.0)) * mirror
+            quad = [
+                a + (d - a) * start,
+                a + (d - a) * stop,
+                b + (c - b) * stop,
+                b + (c - b) * start,
+            ]
+            corners = np.add(quad, (0.010, 0.0, 0.0)) * mirror
             paint.faces([corners[::-1] if side > 0 else corners])
-        front = np.array((a, b, b - (0.06, 0, 0), a - (0.07, 0, 0))) + (0.0, 0.012, 0.004)
+        edge = (a, b, b - (0.06, 0, 0), a - (0.07, 0, 0))
+        front = np.add(edge, (0.0, 0.012, 0.004))
         paint.faces([(front if side > 0 else (front * mirror)[::-1])])
     w, y0, y1, top = b[0], design.roof_front, design.roof_rear, design.roof
     across = np.array((-w - 0.015, -w, -0.5 * w, 0.0, 0.5 * w, w, w + 0.015))
     drop = np.array((0.08, 0.035, 0.01, 0.0, 0.01, 0.035, 0.08))
     rows = [(y1 - 0.03, 0.06), (y1 + 0.05, 0.015), ((y0 + y1) / 2, 0.0), (y0 - 0.05, 0.015)]
     rows.append((y0 + 0.04, 0.06))
-    paint.grid([[(x, y, top - dx - dy) for x, dx in zip(across, drop, strict=True)] for y, dy in rows])
+    paint.grid(
+        [[(x, y, top - dx - dy) for x, dx in zip(across, drop, strict=True)] for y, dy in rows]
+    )
 
 
 def _wheel(kit: Kit, x: float, y: float) -> None:
@@ -214,7 +238,10 @@ def _far(design: Design, paint: str) -> Node:
     kit = Kit(MATERIALS)
     half, w = design.length / 2.0, design.width / 2.0
     kit[f"CarPaint{paint}"].box((-w, -half, 0.2), (w, half, design.belt), "xXyYZ")
-    low, high = (-w + 0.12, design.roof_rear, design.belt), (w - 0.12, design.cowl - 0.3, design.roof)
+    low, high = (
+        (-w + 0.12, design.roof_rear, design.belt),
+        (w - 0.12, design.cowl - 0.3, design.roof),
+    )
     kit["CarGlass"].box(low, high, "xXyYZ")
     name = f"{design.name}{paint}Far"
     return Node(name, meshes=kit.meshes(name))
@@ -235,6 +262,11 @@ def headlights(owner: str, design: Design) -> list[Node]:
     aim = turn("x", 90.0 - BEAM_DOWN)
     y = design.length / 2.0 + 0.03
     return [
-        Node(f"{owner}_Headlamp{side}", translation=(x, y, HEADLAMP_HEIGHT), rotation=aim, light=_BEAM)
+        Node(
+            f"{owner}_Headlamp{side}",
+            translation=(x, y, HEADLAMP_HEIGHT),
+            rotation=aim,
+            light=_BEAM,
+        )
         for x, side in place
     ]

@@ -17,7 +17,7 @@ GLASS = (0.60, 0.20)  # m, along and across the head: 0.12 m2 seen from below
 LANTERN_HEIGHT = 4.15  # m above the arcade's floor
 
 LUMINAIRE = Light(
-    "LuminaireLamp", "spot", SODIUM, cutoff=75.0, exponent=1.0, attenuation=(0.5, 0.05, 0.01)
+    "LuminaireLamp", "spot", SODIUM, cutoff=75.0, exponent=2.0, attenuation=(0.5, 0.05, 0.01)
 )
 LANTERN = Light("ArcadeLamp", "point", WARM_WHITE, attenuation=(0.5, 0.1, 0.05))
 
@@ -125,11 +125,9 @@ def signal() -> Node:
     for _, z in _LENSES:
         t = np.linspace(0.0, np.pi, 7)
         rim = np.stack((0.115 * np.cos(t), np.zeros(7), z + 0.115 * np.sin(t)), axis=1)
-        for points in (
-            np.stack((rim + (0, -0.16, 0), rim + (0, -0.34, 0))),
-            np.stack((rim + (0, -0.34, 0), rim + (0, -0.16, 0))),
-        ):
-            box.grid(points)
+        hood = np.stack((np.add(rim, (0, -0.16, 0)), np.add(rim, (0, -0.34, 0))))
+        box.grid(hood)
+        box.grid(hood[::-1])  # its other side
     aspects = []
     for lit in ("Red", "Green"):
         lenses = [

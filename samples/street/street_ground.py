@@ -6,6 +6,8 @@ above it, they would flicker at a distance, where the depth buffer is coarse.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from street_buildings import FLOOR
 from street_materials import MATERIALS
@@ -45,7 +47,9 @@ def _carriageway(kit: Kit) -> None:
     kit["Marking"].cells(corners, paint)
 
 
-def _flat(kit: Kit, material: str, x: tuple[float, float], y: tuple[float, float], z: float) -> None:
+def _flat(
+    kit: Kit, material: str, x: tuple[float, float], y: tuple[float, float], z: float
+) -> None:
     """A level rectangle in cells of at most 8 m, so that light by vertex has something to go by."""
     xs = np.linspace(*x, max(2, round(abs(x[1] - x[0]) / 8.0) + 1))
     ys = np.linspace(*y, max(2, round(abs(y[1] - y[0]) / 8.0) + 1))
@@ -62,7 +66,7 @@ def ground() -> Node:
     at = np.linspace(0.0, LENGTH, 21)
     for side in (1.0, -1.0):
         points = np.array([[(side * x, y, z) for y in at[:: int(side)]] for x, z in section])
-        for low, high in zip(points, points[1:], strict=False):
+        for low, high in pairwise(points):
             corners = np.stack((low[:-1], low[1:], high[1:], high[:-1]), axis=1)
             kit["Kerb"].faces(corners[:, ::-1])
     full = (0.0, LENGTH)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from street_buildings import FLOOR, Building, Storey, build
-from street_cars import ESTATE, HATCHBACK, SALOON, Design, car, headlights
+from street_cars import ESTATE, HATCHBACK, SALOON, Design, bonnet, car, headlights
 from street_furniture import (
     LAMP_HEIGHT,
     LAMP_REACH,
@@ -150,7 +150,7 @@ def _furniture() -> Node:
     ):
         group.children.append(Node(name, "pat", place, turn("z", degrees), children=[model]))
     column = poster_column()
-    group.children.append(Node("PosterColumn_1", "pat", (7.1, 38.0, FLOOR), children=[column]))
+    group.children.append(Node("PosterColumn_1", "pat", (7.2, 57.0, FLOOR), children=[column]))
     return group
 
 
@@ -174,7 +174,7 @@ def _drive(start: Vec3, speed: float, rotation: Quat = UNTURNED) -> Path:
 
 
 def _traffic() -> list[Node]:
-    """The car ahead, the oncoming car, and the own car, of which only the beams are there."""
+    """The car ahead, the oncoming car, and the bonnet and beams of the own car."""
     own, back = (LANE_MIDDLE, 14.0, 0.0), turn("z", 180.0)
     speed = 40.0 / 3.6
     moving = (
@@ -185,8 +185,8 @@ def _traffic() -> list[Node]:
     for name, path, (design, paint) in moving:
         body = [car(design, paint, lit=True), *headlights(name, design)]
         nodes.append(Node(name, "matrix", path=path, children=body))
-    beams = headlights("OwnCar", HATCHBACK)
-    nodes.append(Node("OwnCar", "matrix", path=_drive(own, speed), children=beams))
+    front = [bonnet(HATCHBACK, "Blue"), *headlights("OwnCar", HATCHBACK)]
+    nodes.append(Node("OwnCar", "matrix", path=_drive(own, speed), children=front))
     eye = (own[0] + EYE[0], own[1] + EYE[1], EYE[2])
     look = turn("x", 90.0)
     nodes.append(Node("Driver", "matrix", path=_drive(eye, speed, look), camera=Camera(50.0)))
@@ -195,10 +195,10 @@ def _traffic() -> list[Node]:
 
 def _views() -> list[Node]:
     """The cameras that stand still."""
-    overview = turn("x", 86.0)
+    overview = turn("x", 88.0)
     arcade = compose(turn("z", -7.0), turn("x", 90.0))
     return [
-        Node("Overview", "matrix", (2.6, -9.0, 7.5), overview, camera=Camera(50.0)),
+        Node("Overview", "matrix", (0.8, 3.0, 6.0), overview, camera=Camera(50.0)),
         Node("ArcadeWalk", "matrix", (-12.2, 1.5, 1.75), arcade, camera=Camera(60.0)),
     ]
 
@@ -206,7 +206,7 @@ def _views() -> list[Node]:
 def street() -> Node:
     """The whole scene."""
     sun = Light("SunLight", "directional", (0.9, 0.9, 0.9))
-    high = compose(turn("z", -40.0), turn("x", 38.0))
+    high = compose(turn("z", 35.0), turn("x", 50.0))  # from behind the right shoulder
     return Node(
         "Street",
         children=[

@@ -35,7 +35,7 @@ _CAR_COLOURS: dict[str, Vec3] = {
 
 _ALL = [
     # ground
-    Material("Asphalt", texture="asphalt.png", tile=4.0),
+    Material("Asphalt", texture="asphalt.png", tile=7.0),
     Material("Marking", texture="marking.png", tile=1.5),
     Material("Kerb", texture="granite.png", tile=1.0),
     Material("Pavement", texture="pavement.png", tile=2.4),
@@ -49,6 +49,7 @@ _ALL = [
     Material("PlasterRose", (0.90, 0.66, 0.58), "plaster.png", tile=4.0),
     Material("Trim", texture="stone_smooth.png", tile=2.0),
     Material("Ceiling", (0.95, 0.93, 0.88), "plaster.png", tile=4.0),
+    Material("PartyWall", (0.62, 0.58, 0.50), "plaster.png", tile=4.0),
     Material("Slate", texture="slate.png", tile=2.0),
     _plain("Zinc", (0.36, 0.39, 0.42), 0.15, 20.0),
     _plain("Chimney", (0.42, 0.20, 0.13)),

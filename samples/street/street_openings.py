@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from street_model import Array
@@ -91,7 +92,7 @@ def wall(
     """The wall x0, x1, z0, z1 around a hole, its corners shared so that no crack opens."""
     x0, x1, z0, z1 = bounds
     levels = [z for z in (z0, hole.bottom, hole.springing, z1) if z0 <= z <= z1]
-    for low, high in zip(levels, levels[1:], strict=False):
+    for low, high in pairwise(levels):
         rectangle(shape, x0, hole.left, low, high, y, back)
         rectangle(shape, hole.right, x1, low, high, y, back)
     rectangle(shape, hole.left, hole.right, z0, hole.bottom, y, back)
@@ -189,7 +190,7 @@ def window(
     pane: str,
 ) -> None:
     """One bay of a storey: the wall x0, x1, z0, z1 with a recessed window in its middle."""
-    x0, x1, z0, z1 = bounds
+    x0, x1, z0, _ = bounds
     middle, half = (x0 + x1) / 2.0, style.width / 2.0
     springing = z0 + style.sill + style.height - style.rise
     hole = Opening(middle - half, middle + half, z0 + style.sill, springing, style.rise)
@@ -203,7 +204,7 @@ def window(
     surround(trim, hole, edge, 0.06)
     trim.box((a - edge - 0.06, -0.16, low - 0.12), (b + edge + 0.06, 0.26, low), "xXyzZ")
     if style.hood == "hood":
-        profile = np.array(HOOD) + (0.0, high + edge)
+        profile = np.add(HOOD, (0.0, high + edge))
         trim.extrude(profile, a - edge - 0.14, b + edge + 0.14)
     elif style.hood == "pediment":
         pediment(trim, a - edge - 0.16, b + edge + 0.16, high + edge)

@@ -89,7 +89,7 @@ def _fascia(
     row = 1.0 / len(SIGNS)
     t = 1.0 - (shop.sign + 1) * row
     kit["SignLit" if shop.lit else "Sign"].picture(board, (0.0, t, 1.0, t + row))
-    wood.extrude(np.array(HOOD) + (y, high), x0, x1)
+    wood.extrude(np.add(HOOD, (y, high)), x0, x1)
     if shop.awning:
         canvas, foot = kit["Awning"], low - 0.45
         back, out = y - 0.13, y - 1.25
@@ -100,7 +100,7 @@ def _fascia(
         canvas.quad(
             (x0, out, foot - 0.2), (x1, out, foot - 0.2), (x1, out, foot), (x0, out, foot), hem
         )
-    if shop.lit and SIGNS[shop.sign] == "PHARMACIE":
+    if shop.lit and shop.door and SIGNS[shop.sign] == "PHARMACIE":
         cross, x, z = kit["CrossLit"], x0 + 0.14, high + 0.75
         cross.box((x - 0.05, y - 1.0, z), (x + 0.05, y - 0.2, z + 0.27), "xXyYzZ")
         cross.box((x - 0.05, y - 0.735, z + 0.27), (x + 0.05, y - 0.465, z + 0.535), "xXyYZ")

@@ -36,12 +36,15 @@ def asphalt() -> Array:
     grey = np.where(stones, grey + 0.16, grey)
     patch = np.zeros((n, n), dtype=bool)
     patch[60:190, 300:430] = True
-    grey = np.where(patch, grey * 0.80, grey)
+    grey = np.where(patch, grey * 0.88, grey)
     y = np.arange(n)
-    for start, wave, width in ((90, 23.0, 2), (390, 31.0, 1)):
+    for start, wave, width in ((90, 23.0, 1), (390, 31.0, 0)):
         walk = start + wave * np.sin(2 * np.pi * y / n) + 7.0 * np.sin(6 * np.pi * y / n + wave)
+        walk += np.cumsum(rng.integers(-1, 2, n)) * np.sin(
+            np.pi * y / n
+        )  # ragged, closed at the ends
         for dx in range(-width, width + 1):
-            grey[y, (walk.astype(int) + dx) % n] *= 0.62
+            grey[y, (walk.astype(int) + dx) % n] *= 0.72
     return tint(grey, (1.0, 1.0, 1.0))
 
 

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from street_model import UNTURNED, Camera, Light, Material, Mesh, Node, Path as Motion
+from street_model import UNTURNED, Camera, Light, Material, Mesh, Node
+from street_model import Path as Motion
 
 _FLOAT, _USHORT, _UINT = 5126, 5123, 5125
 _VERTICES, _INDICES = 34962, 34963
@@ -42,7 +43,12 @@ class _Document:
         self._primitives: dict[int, dict[str, Any]] = {}
 
     def accessor(
-        self, values: np.ndarray, component: int, kind: str, target: int | None, bounds: bool = False
+        self,
+        values: np.ndarray,
+        component: int,
+        kind: str,
+        target: int | None,
+        bounds: bool = False,
     ) -> int:
         """Append an array to the buffer; returns its accessor. ``bounds`` adds min and max."""
         dtype = {_FLOAT: "<f4", _USHORT: "<u2", _UINT: "<u4"}[component]
@@ -103,13 +109,15 @@ class _Document:
             cut = mesh.quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
             index = np.concatenate((cut, mesh.tris)).reshape(-1)
             component = _USHORT if len(mesh.points) < 65535 else _UINT
-            uvs = np.stack((mesh.uvs[:, 0], 1.0 - mesh.uvs[:, 1]), axis=1)  # t = 0 at the top
+            attributes = {
+                "POSITION": self.accessor(mesh.points, _FLOAT, "VEC3", _VERTICES, bounds=True),
+                "NORMAL": self.accessor(mesh.normals, _FLOAT, "VEC3", _VERTICES),
+            }
+            if mesh.material.texture is not None:
+                uvs = np.stack((mesh.uvs[:, 0], 1.0 - mesh.uvs[:, 1]), axis=1)  # t = 0 at the top
+                attributes["TEXCOORD_0"] = self.accessor(uvs, _FLOAT, "VEC2", _VERTICES)
             self._primitives[id(mesh)] = {
-                "attributes": {
-                    "POSITION": self.accessor(mesh.points, _FLOAT, "VEC3", _VERTICES, bounds=True),
-                    "NORMAL": self.accessor(mesh.normals, _FLOAT, "VEC3", _VERTICES),
-                    "TEXCOORD_0": self.accessor(uvs, _FLOAT, "VEC2", _VERTICES),
-                },
+                "attributes": attributes,
                 "indices": self.accessor(index, component, "SCALAR", _INDICES),
                 "material": self.material(mesh.material),
             }
@@ -132,7 +140,12 @@ class _Document:
 
     def camera(self, name: str, camera: Camera) -> int:
         """The index of a new camera."""
-        lens = {"yfov": math.radians(camera.fov), "aspectRatio": _ASPECT, "znear": 0.1, "zfar": 500.0}
+        lens = {
+            "yfov": math.radians(camera.fov),
+            "aspectRatio": _ASPECT,
+            "znear": 0.1,
+            "zfar": 500.0,
+        }
         self.cameras.append({"name": name, "type": "perspective", "perspective": lens})
         return len(self.cameras) - 1
 

@@ -55,7 +55,17 @@ def test_an_endless_line_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_faces_with_bad_indices_are_dropped_and_counted(tmp_path: Path) -> None:
-    bad = ["1 2 5", "0 1 2", "-5 1 2", "1/5 2/2 3/3", "1//2 2//1 3//1", "1 2 x", "1/1/1/1 2 3"]
+    bad = [
+        "1 2 5",
+        "0 1 2",
+        "-5 1 2",
+        "1/-5 2/2 3/3",
+        "1//-2 2//1 3//1",
+        "1/5 2/2 3/3",
+        "1//2 2//1 3//1",
+        "1 2 x",
+        "1/1/1/1 2 3",
+    ]
     text = SQUARE + "f 1 2 3 4\n" + "".join(f"f {face}\n" for face in bad) + "f 4 3 2\n"
     loaded = load_text(tmp_path, text)
     assert loaded.mesh.face_counts.tolist() == [4, 3]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from obj_builder import TRIANGLE, load_text, quick
 
-from hdrusd.importers import obj_text
+from hdrusd.importers import obj_statements, obj_text
 
 TEXT = "# c\nv 0 0 0\nv 1 0 0\n\nv 0 1 0\no métal\nf 1 2 3\n"
 
@@ -68,6 +69,28 @@ def test_blocks_of_any_size_hold_the_same_lines(size: int, joint: str) -> None:
     assert parts == whole
     physical = text.count("\n")
     assert whole[-1] == (physical, [b"f", b"3", b"2", b"1"])
+
+
+@pytest.mark.parametrize("size", [1, 30, 70, 1 << 20])
+def test_statements_of_one_block_reach_into_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int
+) -> None:
+    """Indices that count back, colours, the current object and material, and line numbers."""
+    monkeypatch.setattr(obj_statements, "blocks", partial(obj_text.blocks, size=size))
+    text = "v 0 0 0\nv 1 0 0\nvt 0 0\nvt 1 0\no a\nusemtl x\nv 0 1 0 1 0 0\n\nvt 0 1\n"
+    text += "f -3/-3 -2/-2 -1/-1\nusemtl y\nv 5 5 5\nf -1 -2 -3\nf 1 2 9\no b\nf 1 2 4\n"
+    loaded = load_text(tmp_path, text)
+    first, second = loaded.scene.meshes
+    assert first.points[first.face_indices].tolist() == [
+        *([0, 0, 0], [1, 0, 0], [0, 1, 0]),
+        *([5, 5, 5], [0, 1, 0], [1, 0, 0]),
+    ]
+    assert first.uvs["st"][0].tolist()[:3] == [[0, 0], [1, 0], [0, 1]]
+    assert first.colors is not None
+    assert first.colors.tolist() == [[1, 1, 1, 1], [1, 1, 1, 1], [1, 0, 0, 1], [1, 1, 1, 1]]
+    assert {s.material: s.faces.tolist() for s in first.subsets} == {0: [0], 1: [1]}
+    assert (second.name, second.material, second.source.place) == ("b", 1, 15)
+    assert loaded.finding("face-index").source.place == 14
 
 
 WORDS = st.text("0123456789/-+.x", min_size=1, max_size=7)

@@ -1,9 +1,16 @@
 // Geometry of shader 1: camera-relative world space, metres.
 in vec3 in_position;   // mesh space, scene units
 in vec3 in_normal;
+#ifdef TEXTURED
 in vec4 in_uv01;       // two texture coordinate sets, t up
 in vec4 in_uv23;
+out vec4 uv01;
+out vec4 uv23;
+#endif
+#ifdef VERTEX_COLOR
 in vec3 in_color;      // linear factor on the diffuse reflectance
+out vec3 color;
+#endif
 in vec4 in_row0;       // per instance: columns of the row-vector matrix to
 in vec4 in_row1;       // camera-relative metres, translation in w
 in vec4 in_row2;
@@ -13,9 +20,6 @@ uniform float handedness;      // sign of the instance matrices' determinant
 
 out vec3 position;
 out vec3 normal;
-out vec4 uv01;
-out vec4 uv23;
-out vec3 color;
 
 void main()
 {
@@ -25,8 +29,12 @@ void main()
     vec3 a = in_row0.xyz, b = in_row1.xyz, c = in_row2.xyz;
     normal = handedness * vec3(dot(cross(b, c), in_normal), dot(cross(c, a), in_normal),
                                dot(cross(a, b), in_normal));
+#ifdef TEXTURED
     uv01 = in_uv01;
     uv23 = in_uv23;
+#endif
+#ifdef VERTEX_COLOR
     color = in_color;
+#endif
     gl_Position = view_projection * vec4(position, 1.0);
 }

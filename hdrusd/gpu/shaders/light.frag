@@ -12,20 +12,23 @@ layout(location = 0) out vec4 hdr;
 
 // Rows of a light: position, w | intensity rgb, radius | axis, exponent | inner, outer, -, -
 #ifdef CONES
-#define CONE(i, l) cone_factor(-dot(normalize(l), data[(i) * ROWS + 2].xyz), data[(i) * ROWS + 3].x, \
-                               data[(i) * ROWS + 3].y, data[(i) * ROWS + 2].w)
+#define CONE(i) * cone_factor(-dot(l, data[(i) * ROWS + 2].xyz), data[(i) * ROWS + 3].x, \
+                              data[(i) * ROWS + 3].y, data[(i) * ROWS + 2].w)
 #else
-#define CONE(i, l) 1.0
+#define CONE(i)
 #endif
 
 #define SHADE(i) { \
     vec3 l = light_vector(data[(i) * ROWS].xyz, data[(i) * ROWS].w, p); \
-    float e = illuminance(l, n, data[(i) * ROWS + 1].w) * CONE(i, l); \
+    float d2 = max(dot(l, l), 1e-20); \
+    l *= inversesqrt(d2); \
+    float nl = dot(n, l); \
+    float e = illuminance(nl, d2, data[(i) * ROWS + 1].w) CONE(i); \
     vec3 lux = data[(i) * ROWS + 1].xyz * e; \
     sum += lux; \
-    if (glossy) { \
-        vec3 h = normalize(normalize(l) + v); \
-        gloss += lux * blinn_phong(dot(n, h), shininess, lambert_scale); \
+    if (glossy && e > 0.0) { \
+        float nh = half_cosine(nl, nv, dot(l, v)); \
+        gloss += lux * blinn_phong(nh, shininess, lambert_scale); \
     } }
 
 void main()
@@ -38,6 +41,7 @@ void main()
     vec3 rho = texelFetch(g_diffuse, pixel, 0).rgb;
     vec3 ks = texelFetch(g_specular, pixel, 0).rgb;
     vec3 v = toward_eye == vec3(0.0) ? -normalize(p) : toward_eye;
+    float nv = dot(n, v);
     bool glossy = ks.r + ks.g + ks.b > 0.0;
     vec3 sum = vec3(0.0), gloss = vec3(0.0);
     SHADE(0)

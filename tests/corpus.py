@@ -1,0 +1,297 @@
+"""Every database and stage below a folder, from reading to a picture, hostile ones included.
+
+    python -m tests.corpus [DIR] [--out DIR] [--markdown FILE] [--only PATTERN]
+
+A legacy file is converted, checked and rendered; a USD file is described and rendered. Each
+command runs in a process of its own under limits. A file passes when it ends in a picture
+with light in it, or in one line on standard error and a documented exit code; either way
+nothing may be written outside the output folder and nothing half-written may stay.
+
+A file in ``set/model/...`` below DIR may name files anywhere in ``set/model`` (``--root``),
+because some models keep their textures beside the folder of their meshes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hdrusd.images import read_exr
+
+LEGACY = (".gltf", ".glb", ".obj", ".osg", ".osgt")
+STAGES = (".usda", ".usdc", ".usd", ".usdz")
+
+#: Exit codes of the README that say why a file ended without a picture.
+REFUSALS = range(1, 6)
+
+#: Address space of a conversion, bytes: a declared size that is believed ends here.
+CONVERT_BYTES = 2 << 30
+
+#: Wall time of each command, seconds.
+SECONDS = 60.0
+
+WIDTH, HEIGHT = 320, 180
+
+_PROGRAM = """
+import resource, sys
+if {limit}:
+    resource.setrlimit(resource.RLIMIT_AS, ({limit}, {limit}))
+from hdrusd.cli import main
+sys.argv[0] = "hdrusd"
+main()
+"""
+
+COLUMNS = ("file", "outcome", "triangles", "materials", "textures", "lights", "findings", "seconds")
+
+
+@dataclass(slots=True)
+class Row:
+    """What became of one file. ``problem`` is empty where it passed."""
+
+    name: str  # relative to the folder, with slashes
+    code: int = 0
+    message: str = ""  # the line on standard error of a refusal
+    seconds: float = 0.0
+    counts: dict[str, int] = field(default_factory=dict)
+    findings: int | None = None  # of conversion and rendering together
+    lit: float = 0.0  # share of the pixels above 0 cd/m2
+    problem: str = ""
+
+    @property
+    def outcome(self) -> str:
+        """For a table: the picture's lit share, the refusal, or what is wrong."""
+        if self.problem:
+            return f"**{self.problem}**"
+        if self.code:
+            return f"exit {self.code}: {self.message}"
+        return f"picture, {self.lit:.0%} lit" if self.lit >= 0.01 else "picture, under 1% lit"
+
+    def cells(self) -> list[str]:
+        """One cell a column of ``COLUMNS``."""
+        shown = [self.counts.get(name) for name in COLUMNS[2:6]]
+        numbers = ["" if value is None else str(value) for value in (*shown, self.findings)]
+        return [self.name, self.outcome, *numbers, f"{self.seconds:.1f}"]
+
+
+class WrongError(Exception):
+    """A file did not end as it must; the text says how."""
+
+
+class RefusedError(Exception):
+    """A command ended with one clear line and a documented exit code."""
+
+    def __init__(self, code: int, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+def corpus_files(folder: Path, only: str = "*") -> list[Path]:
+    """The databases and stages below ``folder`` whose relative path matches ``only``."""
+    found = (path for path in folder.rglob("*") if path.suffix.lower() in LEGACY + STAGES)
+    return sorted(p for p in found if p.is_file() and fnmatch(p.relative_to(folder).as_posix(), only))
+
+
+def run_corpus(
+    folder: Path, files: Iterable[Path], output: Path, workers: int = 1
+) -> Iterator[Row]:
+    """Try each file, in order, into a folder of its own below ``output``."""
+    with ThreadPoolExecutor(workers) as pool:
+        yield from pool.map(lambda file: _try(folder, file, output), files)
+
+
+def _try(folder: Path, file: Path, output: Path) -> Row:
+    row = Row(file.relative_to(folder).as_posix())
+    home = output / row.name.replace("/", "__")
+    case = Case(folder, file, home)
+    before = listing(folder)
+    start = time.perf_counter()
+    try:
+        case.run(row)
+    except RefusedError as refusal:
+        row.code, row.message = refusal.code, str(refusal)
+    except WrongError as wrong:
+        row.problem = str(wrong)
+    row.seconds = time.perf_counter() - start
+    row.problem = row.problem or case.strays(refused=row.code != 0)
+    if not row.problem and listing(folder) != before:
+        row.problem = "the source folder was written to"
+    return row
+
+
+@dataclass(slots=True)
+class Case:
+    """One file and the folders it may use: ``out`` for results, ``cwd`` and ``tmp`` for nothing."""
+
+    folder: Path
+    file: Path
+    home: Path
+
+    def __post_init__(self) -> None:
+        for name in ("out", "cwd", "tmp"):
+            (self.home / name).mkdir(parents=True)
+
+    @property
+    def out(self) -> Path:
+        """Where the commands are told to write."""
+        return self.home / "out"
+
+    def run(self, row: Row) -> None:
+        """Fill in ``row``. Raises RefusedError, WrongError."""
+        if self.file.suffix.lower() in STAGES:
+            stage = self.file
+            described = self._json(["info", str(stage), "--json"])
+            row.counts = {name: described[name] for name in ("triangles", "materials")}
+            row.counts["lights"] = int(str(described["lights"]).partition(",")[0])
+            row.findings = 0
+        else:
+            stage = self.out / "stage.usda"
+            roots = self._roots()
+            converted = self._json(
+                ["convert", str(self.file), str(stage), *roots, "--json", "--quiet"], CONVERT_BYTES
+            )
+            row.counts = converted["counts"] | {
+                "textures": len(converted["textures"]),
+                "lights": len(converted["lights"]),
+            }
+            row.findings = len(converted["findings"])
+            self._hdrusd(["check", str(stage)])
+        exr, png = self.out / "frame.exr", self.out / "frame.png"
+        size = ["--imageWidth", str(WIDTH), "--imageHeight", str(HEIGHT)]
+        rendered = self._json(
+            ["render", str(stage), str(exr), "--png", str(png), *size, "--json", "--quiet"]
+        )
+        row.findings += len(rendered["findings"])
+        rgb, _ = read_exr(exr)
+        if rgb.shape != (HEIGHT, WIDTH, 3) or not np.isfinite(rgb).all():
+            raise WrongError("the frame has a wrong size or numbers that are not finite")
+        if not png.is_file():
+            raise WrongError("no PNG")
+        row.lit = float((rgb.max(axis=-1) > 0.0).mean())
+        if row.lit == 0.0:
+            raise WrongError("the picture is black")
+
+    def strays(self, *, refused: bool) -> str:
+        """What lies where nothing may lie; empty when all is well."""
+        wrong = [self.home / name for name in ("cwd", "tmp") if any((self.home / name).iterdir())]
+        wrong += [p for p in self.home.iterdir() if p.name not in ("out", "cwd", "tmp")]
+        wrong += [p for p in self.out.rglob(".*") if p not in wrong]
+        if refused:  # a refusal of the renderer leaves the stage; one of convert leaves nothing
+            whole = (self.out / "stage.usda").is_file()
+            wrong += [] if whole else list(self.out.iterdir())
+        names = sorted({path.relative_to(self.home).as_posix() for path in wrong})
+        return f"left behind: {', '.join(names)}" if names else ""
+
+    def _roots(self) -> list[str]:
+        parts = self.file.relative_to(self.folder).parts[:-1]
+        return ["--root", str(self.folder.joinpath(*parts[:2]))] if len(parts) > 1 else []
+
+    def _json(self, arguments: Sequence[str], limit: int = 0) -> dict[str, Any]:
+        document: dict[str, Any] = json.loads(self._hdrusd(arguments, limit).splitlines()[-1])
+        return document
+
+    def _hdrusd(self, arguments: Sequence[str], limit: int = 0) -> str:
+        """Standard output of a command. Raises RefusedError, WrongError."""
+        command = [sys.executable, "-c", _PROGRAM.format(limit=limit), *arguments]
+        child = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+            cwd=self.home / "cwd",
+            env=os.environ | {"TMPDIR": str(self.home / "tmp")},
+            start_new_session=True,
+        )
+        try:
+            output, errors = child.communicate(timeout=SECONDS)
+        except subprocess.TimeoutExpired:
+            os.killpg(child.pid, signal.SIGKILL)
+            child.communicate()
+            raise WrongError(f"{arguments[0]}: still running after {SECONDS:g} s") from None
+        if child.returncode == 0:
+            return output
+        return self._judge(arguments[0], child.returncode, errors)
+
+    def _judge(self, command: str, code: int, errors: str) -> str:
+        lines = errors.strip().splitlines()
+        if code < 0:
+            raise WrongError(f"{command}: ended by signal {-code}")
+        if "Traceback" in errors:
+            raise WrongError(f"{command}: traceback: {lines[-1]}")
+        if code not in REFUSALS:
+            raise WrongError(f"{command}: exit code {code} is not documented")
+        if len(lines) != 1:
+            raise WrongError(f"{command}: exit {code} with {len(lines)} lines on standard error")
+        raise RefusedError(code, lines[0])
+
+
+def listing(folder: Path) -> dict[str, tuple[int, int]]:
+    """Every path below ``folder`` with its time of modification and size."""
+    found = {}
+    for path in folder.rglob("*"):
+        status = path.lstat()
+        found[path.relative_to(folder).as_posix()] = (status.st_mtime_ns, status.st_size)
+    return found
+
+
+def markdown(rows: Sequence[Row]) -> str:
+    """The rows as a Markdown table with a closing line of totals."""
+    lines = [f"| {' | '.join(COLUMNS)} |", f"| {' | '.join('---' for _ in COLUMNS)} |"]
+    for row in rows:
+        cells = (cell.replace("|", "\\|") for cell in row.cells())
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join([*lines, "", totals(rows), ""])
+
+
+def totals(rows: Sequence[Row]) -> str:
+    """One line: how many pictures, refusals and failures."""
+    wrong = sum(bool(row.problem) for row in rows)
+    refused = sum(not row.problem and row.code != 0 for row in rows)
+    pictures = len(rows) - wrong - refused
+    return f"{len(rows)} files: {pictures} pictures, {refused} refused, {wrong} wrong."
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run, print the table as it grows; 0 when every file passed."""
+    parser = argparse.ArgumentParser(prog="python -m tests.corpus", description=__doc__)
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("folder", nargs="?", type=Path, help="[default: $HDRUSD_TESTDATA/data]")
+    parser.add_argument("--out", type=Path, help="Keep the stages and pictures in this folder.")
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="Write the table.")
+    parser.add_argument("--only", default="*", metavar="PATTERN", help="Paths that match.")
+    options = parser.parse_args(arguments)
+    folder = options.folder
+    if folder is None:
+        if "HDRUSD_TESTDATA" not in os.environ:
+            parser.error("no folder: name one or set HDRUSD_TESTDATA")
+        folder = Path(os.environ["HDRUSD_TESTDATA"]) / "data"
+    folder = folder.resolve()
+    rows = []
+    with tempfile.TemporaryDirectory(prefix="hdrusd-corpus-") as scratch:
+        output = options.out.resolve() if options.out else Path(scratch)
+        for row in run_corpus(folder, corpus_files(folder, options.only), output):
+            rows.append(row)
+            print("  ".join(row.cells()), flush=True)
+    print(totals(rows))
+    if options.markdown is not None:
+        options.markdown.write_text(markdown(rows), encoding="utf-8")
+    return int(any(row.problem for row in rows))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

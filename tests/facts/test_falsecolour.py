@@ -1,0 +1,92 @@
+"""The scale and palette of Radiance's falsecolor, and the legend that goes with them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hdrusd.colour import srgb_encode
+from hdrusd.errors import HdrusdError
+from hdrusd.tonemap.falsecolour import OPERATOR, falsecolour_palette, falsecolour_position
+from hdrusd.tonemap.legend import SMALLEST, paint_legend, tick_luminances
+
+
+def test_position() -> None:
+    # Three decades below 1000 cd/m2; what lies beyond the ends is clipped to them.
+    y = np.array([0.0, 0.5, 1.0, 10.0, 100.0, 1000.0, 1e6])
+    wanted = [0.0, 0.0, 0.0, 1 / 3, 2 / 3, 1.0, 1.0]
+    np.testing.assert_allclose(falsecolour_position(y, 1000.0, 3.0), wanted, atol=1e-15)
+
+
+def test_palette() -> None:
+    # (1.6 v - 0.6, 8/3 v below 3/8 and 1.6 - 1.6 v above, 1 - 8/3 v), clipped.
+    got = falsecolour_palette([0.0, 0.1875, 0.375, 0.6875, 1.0])
+    wanted = [[0, 0, 1], [0, 0.5, 0.5], [0, 1, 0], [0.5, 0.5, 0], [1, 0, 0]]
+    np.testing.assert_allclose(got, wanted, atol=1e-15)
+
+
+def test_picture_shows_the_palette() -> None:
+    rgb = np.array([1.0, 10.0, 100.0, 1000.0])[:, None] * np.ones(3)
+    shown = srgb_encode(OPERATOR.apply(rgb, None, {"decades": 3.0}))
+    # What the display is sent is linear; encoded, it is the palette again (1e-7: the sRGB
+    # standard's rounded thresholds).
+    np.testing.assert_allclose(shown, falsecolour_palette([0.0, 1 / 3, 2 / 3, 1.0]), atol=1e-6)
+
+
+def test_colour_of_the_light_does_not_matter() -> None:
+    same = np.array([[100.0, 100.0, 100.0], [100.0 / 0.2126, 0.0, 0.0], [0.0, 0.0, 100.0 / 0.0722]])
+    got = OPERATOR.apply(same)
+    np.testing.assert_allclose(got, got[[0, 0, 0]], rtol=1e-12)
+
+
+def test_ticks() -> None:
+    ticks = tick_luminances(1000.0, 4.0)
+    assert len(ticks) == 9
+    np.testing.assert_allclose(ticks[::2], [0.1, 1.0, 10.0, 100.0, 1000.0], rtol=1e-12)
+
+
+def test_legend_shows_the_colours_of_the_picture() -> None:
+    picture = np.full((270, 480, 3), 77, np.uint8)
+    paint_legend(picture, 1000.0, 4.0)
+    assert (picture[:, SMALLEST[1] :] == 77).all()
+    # Eight ticks above the lowest, evenly spaced, below the line of the unit.
+    ticks = 8 + np.flatnonzero((picture[8:, 11] == 255).all(axis=-1))
+    assert ticks.size == 9
+    # Rounded to pixels: spaces differ by one.
+    assert np.ptp(np.diff(ticks)) <= 1
+    for row, value in zip(ticks[::-1], tick_luminances(1000.0, 4.0), strict=True):
+        wanted = 255.0 * falsecolour_palette(falsecolour_position(value, 1000.0, 4.0))
+        # The bar has a colour per row, so half a row off: 4/3 of 255 over 240 rows; and rounding.
+        assert np.abs(picture[row, 4] - wanted).max() <= 255 * (8 / 3) * 0.5 / 240 + 0.5
+
+
+def test_legend_is_written_in_digits() -> None:
+    picture = np.zeros((*SMALLEST, 3), np.uint8)
+    paint_legend(picture, 1.0, 1.0)
+    dots = picture.max(axis=-1) == 255
+    # The bar ends in 1 at the top and 0.1 at the bottom: the glyph "1" is 2 6 2 2 7.
+    one = np.array([[0, 1, 0], [1, 1, 0], [0, 1, 0], [0, 1, 0], [1, 1, 1]], bool)
+    windows = np.lib.stride_tricks.sliding_window_view(dots, one.shape)
+    found = (windows == one).all(axis=(-1, -2))
+    assert found[SMALLEST[0] // 4 : SMALLEST[0] // 2 + 4].any()
+    assert found[SMALLEST[0] // 2 + 4 :].any()
+
+
+@given(st.floats(1e-9, 1e12), st.floats(0.1, 20.0), st.integers(0, 900), st.integers(0, 1600))
+def test_legend_of_any_scale(scale: float, decades: float, more_h: int, more_w: int) -> None:
+    picture = np.zeros((SMALLEST[0] + more_h, SMALLEST[1] + more_w, 3), np.uint8)
+    paint_legend(picture, scale, decades)
+    assert picture.any()
+
+
+def test_legend_on_too_small_a_picture() -> None:
+    with pytest.raises(HdrusdError, match="10 x 20 pixels; want"):
+        paint_legend(np.zeros((20, 10, 3), np.uint8), 1000.0, 3.0)
+
+
+@pytest.mark.parametrize("params", [{"decades": 0.0}, {"scale": -1.0}, {"scale": "wide"}])
+def test_senseless_parameter(params: dict) -> None:
+    with pytest.raises(HdrusdError, match="want"):
+        OPERATOR.apply(np.ones((1, 1, 3)), None, params)
