@@ -47,7 +47,6 @@ def _frame(file: Path) -> dict[str, Any]:
 
 
 def _stage(file: Path) -> dict[str, Any]:
-    from hdrusd.gpu.buffers import light_texels
     from hdrusd.render import open_stage
     from hdrusd.report import Report
     from hdrusd.usd.extract import StageReader
@@ -60,7 +59,6 @@ def _stage(file: Path) -> dict[str, Any]:
     time = stage.GetStartTimeCode()
     camera = reader.camera(settings.camera, time, 16 / 9)
     scene = reader.read(time, camera)
-    plain, cones = light_texels(scene.lights, camera)
     return {
         "metersPerUnit": reader.unit,
         "frames": f"{stage.GetStartTimeCode():g} to {stage.GetEndTimeCode():g}, "
@@ -68,7 +66,7 @@ def _stage(file: Path) -> dict[str, Any]:
         "triangles": scene.triangles(),
         "draws": len(scene.draws),
         "materials": len(scene.materials),
-        "lights": f"{len(plain) + len(cones)}, {len(cones)} with a cone or focus",
+        "lights": len(scene.lights),
         "ambient_lx": [round(v, 6) for v in scene.ambient],
         "camera": camera.name,
         "resolution": settings.resolution,

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
-
 #: Characters of a message or a name; file formats have names of any length.
 _LONGEST = 400
 

@@ -118,7 +118,7 @@ def _layer(path: Path) -> Sdf.Layer:
 
 def _mask_path(stage: Path, name: str) -> Sdf.Path:
     path = Sdf.Path(name) if Sdf.Path.IsValidPathString(name) else Sdf.Path()
-    if not path.IsAbsoluteRootOrPrimPath():
+    if not (path.IsAbsolutePath() and path.IsAbsoluteRootOrPrimPath()):
         raise InputError(stage, f"--mask {name}: no prim path; want one like /World/Street")
     return path
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
+
 
 import numpy as np
 import numpy.typing as npt
 
+from hdrusd.photometry.light import inverse_edge, inverse_square
 from hdrusd.scene import NO_CONE, Camera, Draw, Geometry
 
 Floats = npt.NDArray[np.float32]
-
-#: Texels (of 4 floats) a light: a plain one, and one with a cone or focus.
-PLAIN_ROWS = 2
-CONE_ROWS = 4
 
 
 def corner_buffer(
@@ -57,22 +55,64 @@ def mirrored(draw: Draw) -> npt.NDArray[np.bool_]:
     return np.asarray(np.sum(np.cross(a, b) * c, axis=1) < 0.0)
 
 
-def light_texels(lights: npt.NDArray[np.void], camera: Camera) -> tuple[Floats, Floats]:
-    """Plain lights as (n, 2, 4) and those with a cone or focus as (m, 4, 4), for light.vert.
+@dataclass(frozen=True, slots=True)
+class LightClass:
+    """Lights that one variant of light.frag adds up, and as what they reach it."""
+
+    define: str
+    rows: int  # texels (of 4 floats) a light
+    batch: int  # lights an instance: 31 flat vec4 are what OpenGL 3.3 grants between stages
+    texels: Floats  # (n + 1, rows, 4); the last is dark and fills the last batch
+
+
+def light_classes(lights: npt.NDArray[np.void], camera: Camera) -> list[LightClass]:
+    """The lights by what they need, in the layouts of light.frag; empty classes left out.
 
     Dark lights are left out: they add nothing. Positions are relative to the eye.
     """
     lit = lights[np.any(lights["intensity"] != 0.0, axis=1)]
-    cone = (lit["outer"] < NO_CONE) | (lit["exponent"] > 0.0)
-    return _rows(lit[~cone], camera, PLAIN_ROWS), _rows(lit[cone], camera, CONE_ROWS)
+    focus = lit["exponent"] > 0.0
+    cone = (lit["outer"] < NO_CONE) & ~focus & (lit["w"] > 0.0)
+    kinds = (
+        LightClass("PLAIN", 2, 15, _plain(lit[~cone & ~focus], camera)),
+        LightClass("CONES", 3, 10, _cones(lit[cone], camera)),
+        LightClass("FOCUS", 4, 7, _focus(lit[focus], camera)),
+    )
+    return [kind for kind in kinds if len(kind.texels) > 1]
 
 
-def _rows(lights: npt.NDArray[np.void], camera: Camera, rows: int) -> Floats:
-    texels: npt.NDArray[Any] = np.zeros((len(lights), rows, 4), np.float64)
-    relative = lights["position"] - lights["w"][:, None] * np.asarray(camera.eye)
-    texels[:, 0, :3], texels[:, 0, 3] = relative, lights["w"]
-    texels[:, 1, :3], texels[:, 1, 3] = lights["intensity"], lights["radius"]
-    if rows == CONE_ROWS:
-        texels[:, 2, :3], texels[:, 2, 3] = lights["axis"], lights["exponent"]
-        texels[:, 3, 0], texels[:, 3, 1] = lights["inner"], lights["outer"]
+def _plain(lights: npt.NDArray[np.void], camera: Camera) -> Floats:
+    texels = np.zeros((len(lights) + 1, 2, 4))
+    texels[-1] = _DARK[:2]
+    texels[:-1, 0, :3], texels[:-1, 0, 3] = _relative(lights, camera), lights["w"]
+    texels[:-1, 1, :3], texels[:-1, 1, 3] = lights["intensity"], inverse_square(lights["radius"])
     return texels.astype(np.float32)
+
+
+def _cones(lights: npt.NDArray[np.void], camera: Camera) -> Floats:
+    texels = np.zeros((len(lights) + 1, 3, 4))
+    texels[-1] = _DARK[:3]
+    texels[:-1, 0, :3] = _relative(lights, camera)
+    texels[:-1, 0, 3] = inverse_square(lights["radius"])
+    texels[:-1, 1, :3], texels[:-1, 1, 3] = lights["intensity"], lights["inner"]
+    texels[:-1, 2, :3] = lights["axis"]
+    texels[:-1, 2, 3] = inverse_edge(lights["inner"], lights["outer"])
+    return texels.astype(np.float32)
+
+
+def _focus(lights: npt.NDArray[np.void], camera: Camera) -> Floats:
+    texels = np.zeros((len(lights) + 1, 4, 4))
+    texels[-1] = _DARK
+    texels[:-1, :2] = _plain(lights, camera)[:-1]
+    texels[:-1, 2, :3], texels[:-1, 2, 3] = lights["axis"], lights["exponent"]
+    texels[:-1, 3, 0] = lights["inner"]
+    texels[:-1, 3, 1] = inverse_edge(lights["inner"], lights["outer"])
+    return texels.astype(np.float32)
+
+
+def _relative(lights: npt.NDArray[np.void], camera: Camera) -> npt.NDArray[np.float64]:
+    return np.asarray(lights["position"] - lights["w"][:, None] * np.asarray(camera.eye))
+
+
+#: Rows of a light that is not there: dark, and nowhere near a surface.
+_DARK = np.array([[0.0, 0.0, 1e6, 1.0], [0, 0, 0, 1], [0, 0, 1, 1], [0, 1, 0, 0]])

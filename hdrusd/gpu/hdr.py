@@ -1,7 +1,7 @@
 """Shader 1: a RenderScene becomes an HDR frame in cd/m2.
 
-Two steps. The G-buffer: what each pixel shows, drawn once. The lights: one
-instanced draw call for the plain ones and one for those with a cone, each
+Two steps. The surfaces: what each pixel shows, drawn once into the G-buffer
+(gpu/surfaces.py). The lights: one instanced draw call for each class of them, each
 instance adding a batch of lights to every pixel that shows a surface. A batch
 reaches the fragment shader as flat varyings, which on a software device cost a
 third of reading a buffer in every pixel. There is no limit to their number, and
@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Literal
+from typing import Any, Literal
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.gpu.buffers import light_texels
+from hdrusd.gpu.buffers import light_classes
 from hdrusd.gpu.program import Programs
 from hdrusd.gpu.surfaces import SurfacePass, set_used
 from hdrusd.gpu.textures import TextureCache
@@ -30,8 +30,8 @@ Reflection = Literal["lambert", "petit2010"]
 #: Factor between R E and luminance: Lambert's 1/pi, and the paper's 1.
 REFLECTION_SCALE: dict[str, float] = {"lambert": 1.0 / math.pi, "petit2010": 1.0}
 
-#: Lights a batch by rows a light: 31 flat vec4 are what OpenGL 3.3 grants between stages.
-_BATCH = {2: 15, 4: 7}
+#: Layers of the G-buffer, in the order of their attachment.
+LAYERS = ("g_normal", "g_diffuse", "g_specular", "hdr")
 
 
 class HdrRenderer:
@@ -51,30 +51,22 @@ class HdrRenderer:
         gamma: float = TEXTURE_GAMMA,
     ) -> None:
         self.ctx = ctx
+        self.programs = programs
         self.size = size
         self.scale = REFLECTION_SCALE[reflection]
-        textures = TextureCache(ctx, load, gamma)
-        self.surfaces = SurfacePass(ctx, programs, textures, self.scale)
-        self._lights = {
-            rows: programs.get(
-                "gpu/shaders/light.vert",
-                "gpu/shaders/light.frag",
-                {"ROWS": rows, "BATCH": batch} | ({"CONES": 1} if rows == 4 else {}),
-            )
-            for rows, batch in _BATCH.items()
-        }
-        self._layers = [ctx.texture(size, 4, dtype="f4") for _ in range(5)]
+        self.surfaces = SurfacePass(ctx, programs, TextureCache(ctx, load, gamma), self.scale)
+        self._layers = [ctx.texture(size, 4, dtype="f4") for _ in LAYERS]
         for layer in self._layers:
             layer.filter = (moderngl.NEAREST, moderngl.NEAREST)
         depth = ctx.depth_texture(size)
         self._gbuffer = ctx.framebuffer(self._layers, depth)
         self._frame = ctx.framebuffer([self.hdr], depth)
-        self._vaos = {rows: ctx.vertex_array(p, []) for rows, p in self._lights.items()}
+        self._passes: dict[moderngl.Program, moderngl.VertexArray] = {}
 
     @property
     def hdr(self) -> moderngl.Texture:
         """RGBA32F, cd/m2 in RGB, 1 in A where there is a surface; bottom row first."""
-        return self._layers[4]
+        return self._layers[-1]
 
     def render(self, scene: RenderScene) -> moderngl.Texture:
         """Draw one moment; returns ``hdr``."""
@@ -84,12 +76,13 @@ class HdrRenderer:
 
     def read(self) -> npt.NDArray[np.float32]:
         """The frame as (h, w, 3) float32 in cd/m2, top row first."""
-        return np.ascontiguousarray(self.layer(4)[::-1, :, :3])
+        return np.ascontiguousarray(self.layer("hdr")[..., :3])
 
-    def layer(self, index: int) -> npt.NDArray[np.float32]:
-        """A layer of the G-buffer as (h, w, 4): position, normal, diffuse, specular, frame."""
+    def layer(self, name: str) -> npt.NDArray[np.float32]:
+        """A layer of the G-buffer (``LAYERS``; gbuffer.frag) as (h, w, 4), top row first."""
         w, h = self.size
-        return np.frombuffer(self._layers[index].read(), np.float32).reshape(h, w, 4)
+        data = self._layers[LAYERS.index(name)].read()
+        return np.frombuffer(data, np.float32).reshape(h, w, 4)[::-1]
 
     def draw_surfaces(self, scene: RenderScene) -> None:
         """Step one: G-buffer, and emission plus ambient in the frame."""
@@ -112,29 +105,42 @@ class HdrRenderer:
         ctx.depth_func = ">"
         ctx.blend_func = moderngl.ONE, moderngl.ONE
         self._frame.depth_mask = False
-        for texels in light_texels(scene.lights, scene.camera):
-            count, rows = texels.shape[:2]
-            if count == 0:
-                continue
-            table = ctx.texture((rows, count), 4, np.ascontiguousarray(texels), dtype="f4")
+        for unit, layer in enumerate(self._layers[:-1]):
+            layer.use(unit)
+        # A software device runs both sides of a branch, so gloss is a variant of the program.
+        glossy = any(any(m.specular) or m.metallic > 0.0 for m in scene.materials)
+        for kind in light_classes(scene.lights, scene.camera):
+            program = self.programs.get(
+                "gpu/shaders/light.vert",
+                "gpu/shaders/light.frag",
+                {kind.define: 1, "ROWS": kind.rows, "BATCH": kind.batch}
+                | ({"GLOSSY": 1} if glossy else {}),
+            )
+            rows = len(kind.texels)
+            table = ctx.texture((kind.rows, rows), 4, kind.texels, dtype="f4")
             table.filter = (moderngl.NEAREST, moderngl.NEAREST)
-            program = self._lights[rows]
-            for unit, name in enumerate(("g_position", "g_normal", "g_diffuse", "g_specular")):
-                self._layers[unit].use(unit)
-                set_used(program, name, unit)
-            table.use(4)
-            set_used(program, "lights", 4)
-            set_used(program, "first", 0)
-            set_used(program, "count", count)
-            set_used(program, "lambert_scale", self.scale)
-            set_used(program, "toward_eye", _toward_eye(scene.camera))
-            batches = -(-count // _BATCH[rows])
-            self._vaos[rows].render(moderngl.TRIANGLES, vertices=3, instances=batches)
+            table.use(len(LAYERS))
+            uniforms = {"lights": len(LAYERS), "count": rows - 1, "lambert_scale": self.scale}
+            uniforms |= {name: unit for unit, name in enumerate(LAYERS[:-1])}
+            for name, value in (uniforms | window_uniforms(scene.camera)).items():
+                set_used(program, name, value)
+            if program not in self._passes:
+                self._passes[program] = ctx.vertex_array(program, [])
+            batches = -(-(rows - 1) // kind.batch)
+            self._passes[program].render(moderngl.TRIANGLES, vertices=3, instances=batches)
             table.release()
         self._frame.depth_mask = True
         ctx.enable_only(moderngl.NOTHING)
 
 
-def _toward_eye(camera: Camera) -> tuple[float, float, float]:
-    """Unit vector to an orthographic camera; zero for one that stands somewhere."""
-    return camera.back if camera.orthographic else (0.0, 0.0, 0.0)
+def window_uniforms(camera: Camera) -> dict[str, Any]:
+    """What gbuffer.glsl needs to find a pixel's place again: its ray, in world directions."""
+    right, up = np.asarray(camera.right), np.asarray(camera.up)
+    left, far_right, bottom, top = camera.window
+    return {
+        "ray_origin": tuple(left * right + bottom * up),
+        "ray_x": tuple((far_right - left) * right),
+        "ray_y": tuple((top - bottom) * up),
+        "forward": tuple(-np.asarray(camera.back)),
+        "orthographic": camera.orthographic,
+    }

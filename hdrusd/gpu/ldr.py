@@ -1,10 +1,10 @@
 """Shader 2: an HDR frame in cd/m2 becomes an 8-bit sRGB picture.
 
 Clean, operator, sRGB curve, dither and the packing into bytes are one pass. The
-target is RGBA32UI with 16 bytes of the RGB picture to a texel: on llvmpipe at
-1920x1080 the pass then takes 11 ms and the read 0.5 ms, against 17 to 22 ms and 3 ms
-with an RGBA8 target that is read as RGB (converting and swizzling single pixels, 4
-bytes each, costs more than the operator). A GPU does not mind either.
+target is RGBA32UI with 16 bytes of the RGB picture to a texel: on llvmpipe (two
+2.5 GHz cores) at 1920x1080 the pass takes 13 ms and the read 1 ms, against 33 and
+6 ms with the same arithmetic, an RGBA8 target, and a read as RGB. What costs there is
+to convert and swizzle single pixels.
 """
 
 from __future__ import annotations

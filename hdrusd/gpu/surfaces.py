@@ -88,6 +88,7 @@ class SurfacePass:
         rotation[:3, :3] = camera.rotation()
         matrix = np.ascontiguousarray(rotation @ camera.projection(), np.float32)
         program["view_projection"].write(matrix)  # type: ignore[union-attr]
+        set_used(program, "forward", tuple(-np.asarray(camera.back)))
         set_used(program, "ambient", scene.ambient)
         set_used(program, "lambert_scale", self.scale)
 

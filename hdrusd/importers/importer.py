@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -48,16 +47,19 @@ class Resolver:
     def read(self, path: Path | None = None) -> bytes:
         """The bytes of ``path``, or of the source itself. Raises InputError."""
         path = self.source if path is None else path
-        if not path.exists():
-            raise InputError(SourceRef(path), "no such file")
-        if not path.is_file():
-            raise InputError(SourceRef(path), "not a regular file")
-        size = path.stat().st_size
-        if size > self.limits.file_bytes:
+        try:
+            if not path.exists():
+                raise InputError(path, "no such file")
+            if not path.is_file():
+                raise InputError(path, "not a regular file")
+            size = path.stat().st_size
+            if size > self.limits.file_bytes:
+                raise InputError(path, f"{size} bytes; at most {self.limits.file_bytes} are read")
+            return path.read_bytes()
+        except OSError as problem:  # no permission, a broken disk
             raise InputError(
-                SourceRef(path), f"{size} bytes; at most {self.limits.file_bytes} are read"
-            )
-        return path.read_bytes()
+                path, f"cannot be read: {problem.strerror or problem}; want a readable file"
+            ) from problem
 
     def find(self, reference: str, place: SourceRef, *, thing: str = "") -> Path | None:
         """The file that a reference names, or None with a finding.
@@ -114,16 +116,16 @@ class Resolver:
 
 
 def _existing(path: Path) -> Path | None:
-    """``path`` as it stands or without regard to case in its last part; None if neither is there."""
+    """``path`` as it stands, else the like of it in another case; None if neither is there."""
     try:
         if path.exists():
             return path.resolve()
         if path.parent.is_dir():
             wanted = path.name.casefold()
-            for entry in sorted(os.listdir(path.parent)):
-                if entry.casefold() == wanted:
-                    return (path.parent / entry).resolve()
-    except (OSError, ValueError):  # a name too long or unspeakable for this file system
+            for entry in sorted(path.parent.iterdir()):
+                if entry.name.casefold() == wanted:
+                    return entry.resolve()
+    except (OSError, ValueError, RuntimeError):  # a name too long or unspeakable, a loop of links
         return None
     return None
 

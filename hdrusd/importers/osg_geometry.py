@@ -151,7 +151,7 @@ class _Attributes:
         else:
             self._drop(attribute, role, f"binding {binding} is unknown")
             return None
-        if attribute.indices is not None and interpolation != "faceVarying":
+        if attribute.indices is not None and interpolation in ("constant", "uniform"):
             picked = _taken(attribute.indices, picked)
         if len(picked) and (picked.min() < 0 or picked.max() >= len(rows)):
             self._drop(attribute, role, f"{len(rows)} values; want {int(picked.max()) + 1}")

@@ -22,8 +22,12 @@ MIN_REFERENCE_DISTANCE = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """A named rule. ``strength`` is cd for local lights and lux for directional ones, per
-    unit of the light's colour; ``luminance`` is cd/m2 per unit of emission."""
+    """A named rule, per unit of colour.
+
+    ``strength``: cd for local lights and lux for directional ones, from the light,
+    its attenuation per metre, and the scene's diagonal in m; ``luminance``: cd/m2 of
+    emission.
+    """
 
     name: str
     text: str  # for the report

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 from hdrusd.legacy import scene as legacy
 from hdrusd.legacy.scene import RGB
@@ -21,6 +22,9 @@ from hdrusd.units import LUMINANCE_WEIGHTS
 
 #: Radius of a lamp whose size nobody states, m; only other renderers' values depend on it.
 LAMP_RADIUS = 0.05
+
+#: The strongest light that is written, cd or lx: its luminance must fit into 32-bit floats.
+_STRONGEST = 1e30
 
 #: From a colour temperature in K to linear Rec. 709 of luminance 1.
 TemperatureToRGB = Callable[[float], RGB]
@@ -44,10 +48,15 @@ def rule_color(rule: Rule | None, temperature: TemperatureToRGB) -> RGB | None:
 
 @dataclass(frozen=True, slots=True)
 class Interpreter:
-    """The rules of one conversion. ``diagonal``: of the scene, m, for estimates."""
+    """The rules of one conversion.
+
+    ``diagonal``: of the scene, m, for estimates; ``unit``: metres a source unit, in
+    which OpenGL's attenuation counts.
+    """
 
     estimate: Estimate
     diagonal: float
+    unit: float
     temperature: TemperatureToRGB
     report: Report
 
@@ -57,46 +66,69 @@ class Interpreter:
         if not enabled:
             self._note(light, Kind.DROPPED, "light-off", "switched off; not written")
             return None
-        kind = _KINDS[light.kind]
+        light = self._without_negative_colours(light)
         if light.kind == "ambient":
             return self._ambient_light(light, rule)
+        kind: Literal["point", "distant"] = "distant" if light.kind == "directional" else "point"
         color, strength = chromaticity(light.diffuse)
         intensity, provenance, name, source = self._strength(light, rule, kind, strength)
-        if rule is not None and intensity is not None:
+        if rule is not None:
             color = rule_color(rule, self.temperature) or color
-        if intensity is None or not math.isfinite(intensity) or intensity <= 0.0:
+        if intensity == 0.0:
             self._note(light, Kind.DROPPED, "light-dark", "gives no light; not written")
             return None
-        self._note_differences(light, kind)
-        cutoff, softness = 180.0, 0.0
-        if light.spot_cutoff < 180.0:
-            cutoff = light.spot_cutoff
-            if light.spot_inner is not None and cutoff > 0.0:
-                softness = 1.0 - min(light.spot_inner, cutoff) / cutoff
-        radius = (rule.number("radius") if rule else None) or LAMP_RADIUS
-        if kind != "distant" and (rule is None or "radius" not in rule.values):
-            self._note(
-                light,
-                Kind.ASSUMED,
-                "lamp-radius",
-                f"lamp of {LAMP_RADIUS} m radius; none is stated",
-            )
-        return PhotometricLight(
-            kind="spot" if cutoff < 180.0 or light.spot_exponent > 0.0 else kind,
+        if not intensity <= _STRONGEST:
+            text = f"{intensity:g} is beyond 32-bit floats; not written"
+            self._note(light, Kind.INVALID, "light-intensity", text)
+            return None
+        self._note_differences(light)
+        lamp = PhotometricLight(
+            kind=kind,
             intensity=intensity,
             chromaticity=color,
-            cutoff=cutoff,
-            softness=softness,
-            exponent=light.spot_exponent,
-            radius=radius,
             provenance=provenance,
             rule=name,
             source=source,
         )
+        return lamp if kind == "distant" else self._with_lamp(lamp, light, rule)
+
+    def _with_lamp(
+        self, lamp: PhotometricLight, light: legacy.Light, rule: Rule | None
+    ) -> PhotometricLight:
+        """What only a light with a place has: a cone, a focus, a size."""
+        cutoff, softness = 180.0, 0.0
+        if light.spot_cutoff < 180.0:
+            cutoff = max(light.spot_cutoff, 0.0)
+            if light.spot_inner is not None and cutoff > 0.0:
+                softness = 1.0 - min(max(light.spot_inner, 0.0), cutoff) / cutoff
+        radius = rule.number("radius") if rule else None
+        if radius is None:
+            radius = LAMP_RADIUS
+            text = f"lamp of {LAMP_RADIUS} m radius; none is stated"
+            self._note(light, Kind.ASSUMED, "lamp-radius", text)
+        return replace(
+            lamp,
+            kind="spot" if cutoff < 180.0 or light.spot_exponent > 0.0 else "point",
+            cutoff=cutoff,
+            softness=softness,
+            exponent=max(light.spot_exponent, 0.0),
+            radius=radius,
+        )
+
+    def _without_negative_colours(self, light: legacy.Light) -> legacy.Light:
+        """OpenGL lets a light take light away; a lamp does not."""
+        colours = {
+            name: _not_negative(getattr(light, name)) for name in ("diffuse", "specular", "ambient")
+        }
+        if all(getattr(light, name) == color for name, color in colours.items()):
+            return light
+        text = "colour below 0, which would take light away; read as 0"
+        self._note(light, Kind.CLAMPED, "light-negative", text)
+        return replace(light, **colours)  # type: ignore[arg-type]
 
     def _strength(
         self, light: legacy.Light, rule: Rule | None, kind: str, luminance_of_color: float
-    ) -> tuple[float | None, Provenance, str, str]:
+    ) -> tuple[float, Provenance, str, str]:
         """(cd or lx, provenance, rule, source) by the first that knows."""
         key, other = ("illuminance", "candela") if kind == "distant" else ("candela", "illuminance")
         if rule is not None:
@@ -110,7 +142,7 @@ class Interpreter:
         stated = light.lux if kind == "distant" else light.candela
         if stated is not None:
             return stated * luminance_of_color, "authored", "source file", ""
-        value = self.estimate.strength(light, self.diagonal) * luminance_of_color
+        value = self.estimate.strength(self._in_metres(light), self.diagonal) * luminance_of_color
         unit = "lx" if kind == "distant" else "cd"
         self._note(
             light,
@@ -120,18 +152,34 @@ class Interpreter:
         )
         return value, "estimated", self.estimate.name, self.estimate.text
 
+    def _in_metres(self, light: legacy.Light) -> legacy.Light:
+        """The light with its attenuation per metre instead of per source unit."""
+        if light.attenuation is None:
+            return light
+        k0, k1, k2 = light.attenuation
+        return replace(light, attenuation=(k0, k1 / self.unit, k2 / self.unit**2))
+
     def _ambient_light(self, light: legacy.Light, rule: Rule | None) -> PhotometricLight | None:
         value = rule.number("illuminance") if rule else None
+        if rule is not None and "candela" in rule.values:
+            text = f"{rule.place} says candela; want illuminance"
+            self._note(light, Kind.INVALID, "sidecar-unit", text)
         color, strength = chromaticity(
             light.ambient if luminance(light.ambient) > 0.0 else light.diffuse
         )
         if rule is not None and value is not None:
             color = rule_color(rule, self.temperature) or color
             return PhotometricLight(
-                "ambient", value, color, provenance=rule.provenance, rule=str(rule.place)
+                "ambient",
+                value,
+                color,
+                provenance=rule.provenance,
+                rule=str(rule.place),
+                source=rule.source,
             )
         value = self.estimate.ambient * strength
-        if value <= 0.0:
+        if value == 0.0:
+            self._note(light, Kind.DROPPED, "light-dark", "gives no light; not written")
             return None
         self._note(
             light,
@@ -139,10 +187,14 @@ class Interpreter:
             "ambient-estimate",
             f"{value:.4g} lx of sky by rule {self.estimate.name}; the source has no unit",
         )
-        return PhotometricLight("ambient", value, color, rule=self.estimate.name)
+        color = rule_color(rule, self.temperature) or color
+        return PhotometricLight(
+            "ambient", value, color, rule=self.estimate.name, source=self.estimate.text
+        )
 
-    def _note_differences(self, light: legacy.Light, kind: str) -> None:
-        if light.attenuation is not None and kind != "distant" and light.attenuation != (0, 0, 1):
+    def _note_differences(self, light: legacy.Light) -> None:
+        local = light.kind != "directional"
+        if light.attenuation is not None and local and light.attenuation != (0, 0, 1):
             k = ", ".join(f"{v:g}" for v in light.attenuation)
             self._note(
                 light, Kind.REPLACED, "light-attenuation", f"attenuation ({k}) replaced by 1/d^2"
@@ -154,10 +206,13 @@ class Interpreter:
                 "light-range",
                 f"range {light.range:g} m kept as metadata and not applied; light has no range",
             )
-        if kind != "distant" and light.kind != "ambient" and luminance(light.ambient) > 0.0:
+        if luminance(light.ambient) > 0.0:
             self._note(
-                light, Kind.DROPPED, "light-ambient", "ambient part of a local light has no home"
+                light, Kind.DROPPED, "light-ambient", "ambient part of one light has no home"
             )
+        if not local and (light.spot_cutoff < 180.0 or light.spot_exponent > 0.0):
+            text = "cone of a light without a place; it shines everywhere alike"
+            self._note(light, Kind.DROPPED, "light-cone", text)
         if light.candela is None and light.lux is None and light.specular != light.diffuse:
             self._note(
                 light,
@@ -176,33 +231,37 @@ class Interpreter:
     def emission(
         self, material: legacy.Material, rule: Rule | None
     ) -> tuple[RGB, Provenance, str, str]:
-        """Emission in cd/m2 per channel (at 1.0 of its texture): (rgb, provenance, rule, source)."""
+        """Emission in cd/m2 per channel at 1.0 of its texture: (rgb, provenance, rule, source)."""
         stated = rule.number("luminance") if rule else None
         if rule is not None and stated is not None:
             color = rule_color(rule, self.temperature)
             if color is None and luminance(material.emission) > 0.0:
-                color = chromaticity(material.emission)[0]
+                color = chromaticity(_not_negative(material.emission))[0]
             if color is None and not rule.values.get("hdr_texture"):
-                color = chromaticity(material.diffuse)[0]
+                color = chromaticity(_not_negative(material.diffuse))[0]
             r, g, b = color or (1.0, 1.0, 1.0)
             rgb = (r * stated, g * stated, b * stated)
             return rgb, rule.provenance, str(rule.place), rule.source
-        if luminance(material.emission) <= 0.0:
+        emission = _not_negative(material.emission)
+        if emission != material.emission:
+            text = "emission below 0, which would take light away; read as 0"
+            self._note(material, Kind.CLAMPED, "light-negative", text)
+        if not any(emission):
             return (0.0, 0.0, 0.0), "authored", "", ""
         if material.emission_cd_m2:
-            return material.emission, "authored", "source file", ""
-        r, g, b = (self.estimate.luminance * c for c in material.emission)
-        self.report.add(
-            Kind.GUESSED,
-            "emission-estimate",
-            material.source,
-            material.name,
-            f"{luminance((r, g, b)):.4g} cd/m2 by rule {self.estimate.name}; the source has no unit",
-        )
+            return emission, "authored", "source file", ""
+        r, g, b = (self.estimate.luminance * c for c in emission)
+        value = luminance((r, g, b))
+        text = f"{value:.4g} cd/m2 by rule {self.estimate.name}; the source has no unit"
+        self._note(material, Kind.GUESSED, "emission-estimate", text)
         return (r, g, b), "estimated", self.estimate.name, self.estimate.text
 
-    def _note(self, light: legacy.Light, kind: Kind, code: str, text: str) -> None:
-        self.report.add(kind, code, light.source, light.name, text)
+    def _note(
+        self, thing: legacy.Light | legacy.Material, kind: Kind, code: str, text: str
+    ) -> None:
+        self.report.add(kind, code, thing.source, thing.name, text)
 
 
-_KINDS = {"point": "point", "spot": "spot", "directional": "distant", "ambient": "ambient"}
+def _not_negative(color: RGB) -> RGB:
+    r, g, b = (max(c, 0.0) for c in color)
+    return r, g, b

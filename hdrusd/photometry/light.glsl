@@ -14,15 +14,18 @@ float angle_from_cosine(float cosine)
     return cosine < 0.0 ? 3.14159265358979 - p : p;
 }
 
-// Share of the axial intensity sent at an angle of the given cosine; inner, outer: rad.
-float cone_factor(float cosine, float inner, float outer, float exponent)
+// Share of the axial intensity that a cone lets pass at an angle of this cosine: full up to
+// inner (rad), nothing beyond inner + 1 / inverse_width.
+float cone_factor(float cosine, float inner, float inverse_width)
 {
-    float theta = angle_from_cosine(cosine);
-    float t = clamp((theta - inner) / max(outer - inner, 1e-6), 0.0, 1.0);
-    float fade = 1.0 - t * t * (3.0 - 2.0 * t);
-    if (exponent > 0.0)  // a power costs as much as all the rest of a light
-        fade *= pow(max(abs(cosine), 1e-9), exponent);
-    return fade;
+    float t = clamp((angle_from_cosine(cosine) - inner) * inverse_width, 0.0, 1.0);
+    return 1.0 - t * t * (3.0 - 2.0 * t);
+}
+
+// Share of the axial intensity by UsdLux focus, OpenGL's spot exponent.
+float focus_factor(float cosine, float exponent)
+{
+    return pow(max(abs(cosine), 1e-9), exponent);
 }
 
 // From a surface point (m) to the light, unnormalised; w 1: place, w 0: unit direction.
@@ -31,9 +34,9 @@ vec3 light_vector(vec3 position, float w, vec3 point)
     return position - point * w;
 }
 
-// lux per candela: cos(theta) / d^2, from the cosine and the square of the distance (m2);
-// radius in m bounds it inside the lamp.
-float illuminance(float cosine, float d2, float radius)
+// lux per candela: cos(theta) / d^2, from the cosine and 1 / d^2 (1/m2);
+// inverse_radius2 (1/m2) bounds it inside the lamp.
+float illuminance(float cosine, float inverse_d2, float inverse_radius2)
 {
-    return max(cosine, 0.0) / max(d2, radius * radius);
+    return max(cosine, 0.0) * min(inverse_d2, inverse_radius2);
 }

@@ -20,6 +20,10 @@ Array = npt.NDArray[Any]
 Provenance = Literal["measured", "authored", "estimated"]
 
 
+#: 1 / rad: the edge of a cone without softness is a millionth of a radian wide.
+HARD_EDGE = 1e6
+
+
 @dataclass(frozen=True, slots=True)
 class PhotometricLight:
     """What a lamp is, independent of where it stands.
@@ -60,19 +64,26 @@ def angle_from_cosine(cosine: Array) -> Array:
     return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
-def cone_factor(cosine: Array, inner: Array, outer: Array, exponent: Array) -> Array:
-    """Share of the axial intensity that a spot sends in a direction.
+def cone_factor(cosine: Array, inner: Array, inverse_width: Array) -> Array:
+    """Share of the axial intensity that a cone lets pass in a direction (UsdLux ShapingAPI).
 
     ``cosine``: of the angle between the light's axis and the direction of
-    emission; ``inner``, ``outer``: radians, full up to the one and nothing beyond
-    the other, a smoothstep of the angle (not of its cosine) between them;
-    ``exponent``: of the absolute cosine. UsdLux ShapingAPI.
+    emission; ``inner``: radians, full up to here; ``inverse_width``: 1 / rad, of
+    the edge beyond it over which a smoothstep of the angle (not of its cosine)
+    fades to nothing. A hard edge has ``HARD_EDGE``.
     """
-    theta = angle_from_cosine(cosine)
-    width = np.maximum(outer - inner, 1e-6)
-    t = np.clip((theta - inner) / width, 0.0, 1.0)
-    fade = 1.0 - t * t * (3.0 - 2.0 * t)
-    return np.asarray(fade * np.maximum(np.abs(cosine), 1e-9) ** exponent)
+    t = np.clip((angle_from_cosine(cosine) - inner) * inverse_width, 0.0, 1.0)
+    return np.asarray(1.0 - t * t * (3.0 - 2.0 * t))
+
+
+def inverse_edge(inner: Array, outer: Array) -> Array:
+    """1 / rad between two cone angles (rad), at most ``HARD_EDGE``."""
+    return np.asarray(1.0 / np.maximum(np.asarray(outer) - inner, 1.0 / HARD_EDGE))
+
+
+def focus_factor(cosine: Array, exponent: Array) -> Array:
+    """Share of the axial intensity by UsdLux focus: |cosine|^exponent, OpenGL's spot exponent."""
+    return np.asarray(np.maximum(np.abs(cosine), 1e-9) ** exponent)
 
 
 def light_vector(position: Array, w: Array, point: Array) -> Array:
@@ -84,11 +95,16 @@ def light_vector(position: Array, w: Array, point: Array) -> Array:
     return np.asarray(position - point * np.asarray(w)[..., None])
 
 
-def illuminance(cosine: Array, d2: Array, radius: Array) -> Array:
+def illuminance(cosine: Array, inverse_d2: Array, inverse_radius2: Array) -> Array:
     """cos(theta) / d^2 of equation 1: lux per candela (per lux for a distant light).
 
-    ``cosine``: between the normal and the way to the light; ``d2``: the square of
-    the distance, m2, above 0; ``radius``: m, within which the inverse square is not
-    followed.
+    ``cosine``: between the normal and the way to the light; ``inverse_d2``: 1 over
+    the square of the distance, 1/m2; ``inverse_radius2``: 1 over that of the lamp's
+    radius, at which the inverse square stops: nothing is nearer than its surface.
     """
-    return np.asarray(np.maximum(cosine, 0.0) / np.maximum(d2, radius * radius))
+    return np.asarray(np.maximum(cosine, 0.0) * np.minimum(inverse_d2, inverse_radius2))
+
+
+def inverse_square(length: Array) -> Array:
+    """1 / length^2, 1/m2, finite for a length of 0."""
+    return np.asarray(1.0 / np.maximum(np.square(length), 1e-20))

@@ -11,7 +11,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.photometry.light import cone_factor, illuminance, light_vector
+from hdrusd.photometry.light import (
+    cone_factor,
+    focus_factor,
+    illuminance,
+    inverse_edge,
+    inverse_square,
+    light_vector,
+)
 from hdrusd.photometry.reflectance import blinn_phong, half_cosine, lambert
 from hdrusd.scene import NO_CONE
 
@@ -44,10 +51,12 @@ def shade(
         d2 = np.maximum(np.sum(to_light * to_light, axis=-1), 1e-20)
         unit = to_light / np.sqrt(d2)[..., None]
         nl = np.sum(normal * unit, axis=-1)
-        e = illuminance(nl, d2, light["radius"])
+        e = illuminance(nl, 1.0 / d2, inverse_square(light["radius"]))
         if light["outer"] < NO_CONE or light["exponent"] > 0.0:
             cosine = -np.sum(unit * light["axis"], axis=-1)
-            e = e * cone_factor(cosine, light["inner"], light["outer"], light["exponent"])
+            edge = inverse_edge(light["inner"], light["outer"])
+            e = e * cone_factor(cosine, light["inner"], edge)
+            e = e * focus_factor(cosine, light["exponent"])
         lux = light["intensity"] * np.asarray(e)[..., None]
         nh = half_cosine(nl, nv, np.sum(unit * view, axis=-1))
         lobe = blinn_phong(nh, shininess, scale)

@@ -21,12 +21,12 @@ Unknown keys, values of the wrong kind and patterns that match nothing are findi
 
 from __future__ import annotations
 
-import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
+from textwrap import shorten
 from typing import Any, get_args
 
 from hdrusd.errors import InputError, SourceRef
@@ -36,34 +36,54 @@ from hdrusd.report import Kind, Report
 #: The name under which it is looked for beside the source.
 FILE_NAME = "photometry.toml"
 
-_NUMBER = (int, float)
+
+@dataclass(frozen=True, slots=True)
+class _Range:
+    """Numbers that a key takes, ends included."""
+
+    least: float
+    most: float
+
+    def __str__(self) -> str:
+        return f"a number from {self.least:g} to {self.most:g}"
+
+
+#: cd, lx or cd/m2: 32-bit floats end at 3e38, and a lamp of 1 mm makes nits of candela times 3e5.
+_STRENGTH = _Range(0.0, 1e30)
+_KELVIN = _Range(1000.0, 10_000.0)  # the range of UsdLux's blackbody colours
+_GAMMA = _Range(0.1, 10.0)
+_CHANNEL = _Range(0.0, 1e6)
 _COMMON: dict[str, Any] = {"match": str, "source": str, "provenance": str}
 _KEYS: dict[str, dict[str, Any]] = {
     "light": _COMMON
     | {
-        "candela": _NUMBER,
-        "illuminance": _NUMBER,
-        "temperature": _NUMBER,
+        "candela": _STRENGTH,
+        "illuminance": _STRENGTH,
+        "temperature": _KELVIN,
         "color": list,
-        "radius": _NUMBER,
+        "radius": _Range(1e-3, 1e3),  # m
         "enabled": bool,
-        "ies": str,
     },
     "material": _COMMON
     | {
-        "luminance": _NUMBER,
+        "luminance": _STRENGTH,
         "hdr_texture": bool,
-        "temperature": _NUMBER,
+        "temperature": _KELVIN,
         "color": list,
         "diffuse": list,
-        "gamma": _NUMBER,
+        "gamma": _GAMMA,
     },
-    "camera": {"match": str, "fov": _NUMBER, "near": _NUMBER, "far": _NUMBER},
+    "camera": {
+        "match": str,
+        "fov": _Range(0.1, 179.0),  # degrees
+        "near": _Range(1e-6, 1e9),  # source units
+        "far": _Range(1e-6, 1e12),
+    },
     "node": {"match": str, "visible": bool},
 }
 _AMBIENT = {
-    "illuminance": _NUMBER,
-    "temperature": _NUMBER,
+    "illuminance": _STRENGTH,
+    "temperature": _KELVIN,
     "color": list,
     "source": str,
     "provenance": str,
@@ -78,6 +98,7 @@ class Rule:
     place: SourceRef
     values: Mapping[str, Any]
     matched: bool = False
+    late: bool = False  # it fits something, but only what a rule before it has taken
 
     @property
     def pattern(self) -> str:
@@ -116,11 +137,16 @@ class Sidecar:
 
     def match(self, section: str, *names: str) -> Rule | None:
         """The first rule of a section whose pattern fits one of the names."""
+        first: Rule | None = None
         for rule in self.rules:
-            if rule.section == section and any(fnmatchcase(n, rule.pattern) for n in names if n):
+            if rule.section != section or not any(fnmatchcase(n, rule.pattern) for n in names if n):
+                continue
+            if first is None:
                 rule.matched = True
-                return rule
-        return None
+                first = rule
+            else:
+                rule.late = True
+        return first
 
     def note_unmatched(self, report: Report) -> None:
         """A finding for each pattern that matched nothing."""
@@ -131,7 +157,9 @@ class Sidecar:
                     "sidecar-no-match",
                     rule.place,
                     rule.pattern,
-                    f"no {rule.section} of that name",
+                    "what it fits is taken by a pattern before it; want the narrower one first"
+                    if rule.late
+                    else f"no {rule.section} of that name",
                 )
 
 
@@ -147,20 +175,28 @@ def read_sidecar(path: Path, report: Report) -> Sidecar:
     for key, value in document.items():
         place = SourceRef(path, key)
         if key == "gamma":
-            if _fits(value, _NUMBER) and value > 0:
+            if _fits(value, _GAMMA):
                 sidecar.gamma = float(value)
             else:
-                _invalid(report, place, "", f"gamma {value!r}; want a number above 0")
+                _invalid(report, place, "", f"{_shown(value)}; want {_GAMMA}")
         elif key == "ambient":
-            if isinstance(value, dict):
-                sidecar.ambient = Rule(key, place, _checked(value, _AMBIENT, place, report))
-            else:
-                _invalid(report, place, "", "want a table, [ambient]")
+            sidecar.ambient = _read_ambient(value, place, report)
         elif key in _KEYS:
             _read_section(sidecar, key, value, report)
         else:
             _unknown(report, place, key)
     return sidecar
+
+
+def _read_ambient(table: Any, place: SourceRef, report: Report) -> Rule | None:
+    if not isinstance(table, dict):
+        _invalid(report, place, "", "want a table, [ambient]")
+        return None
+    values = _checked(table, _AMBIENT, place, report)
+    if "illuminance" not in values:
+        _invalid(report, place, "", "no illuminance (lx); not used")
+        return None
+    return Rule("ambient", place, values)
 
 
 def _read_section(sidecar: Sidecar, section: str, tables: Any, report: Report) -> None:
@@ -186,9 +222,11 @@ def _checked(
         if key not in keys:
             _unknown(report, place, key)
         elif not _fits(value, keys[key]):
-            _invalid(report, place, key, f"{value!r}; {_wanted(key, keys[key])}")
+            _invalid(report, place, key, f"{_shown(value)}; want {_wanted(keys[key])}")
         elif key == "provenance" and value not in get_args(Provenance):
-            _invalid(report, place, key, f"{value!r}; want {', '.join(get_args(Provenance))}")
+            _invalid(report, place, key, f"{_shown(value)}; want {', '.join(get_args(Provenance))}")
+        elif key == "color" and not any(value):
+            _invalid(report, place, key, "black has no hue; want a number above 0")
         else:
             good[key] = value
     return good
@@ -196,19 +234,27 @@ def _checked(
 
 def _fits(value: Any, kind: Any) -> bool:
     if kind is list:
-        return isinstance(value, list) and len(value) == 3 and all(_fits(v, _NUMBER) for v in value)
-    if kind == _NUMBER:
-        number = isinstance(value, _NUMBER) and not isinstance(value, bool)
-        return bool(number and math.isfinite(value) and value >= 0)
+        channels = isinstance(value, list) and len(value) == 3
+        return channels and all(_fits(v, _CHANNEL) for v in value)
+    if isinstance(kind, _Range):
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        return number and kind.least <= value <= kind.most
     return isinstance(value, kind)
 
 
-def _wanted(key: str, kind: Any) -> str:
+def _wanted(kind: Any) -> str:
     if kind is list:
-        return "want three numbers of at least 0"
-    if kind == _NUMBER:
-        return "want a number of at least 0"
-    return "want true or false" if kind is bool else "want a string"
+        return f"three of {_CHANNEL}"
+    if isinstance(kind, _Range):
+        return str(kind)
+    return "true or false" if kind is bool else "a string"
+
+
+def _shown(value: Any) -> str:
+    """A value as a message quotes it: Python has no text for an integer of 5,000 digits."""
+    if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 64:
+        return "a number of more than 64 bits"
+    return shorten(repr(value), 60)
 
 
 def _unknown(report: Report, place: SourceRef, key: str) -> None:

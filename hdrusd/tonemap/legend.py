@@ -32,7 +32,7 @@ _FONT = {
     "m": (0, 7, 7, 5, 5),
 }
 _ADVANCE, _LINE = 4, 8  # dots from character to character and from line to line
-_BAR, _TICK, _LABEL = 8, 3, 9 * _ADVANCE  # dots across; "%.3g" has at most 9 characters
+_BAR, _TICK, _LABEL = 8, 3, 9 * _ADVANCE  # dots across; a label has at most 9 characters
 
 #: The smallest picture that takes a legend, (height, width).
 SMALLEST = (3 * _LINE, _BAR + _TICK + _LABEL + 4)
@@ -68,7 +68,12 @@ def paint_legend(picture: Picture, scale: float, decades: float) -> None:
         y = bottom - round(k * (bottom - top) / divisions)
         across = slice((2 + _BAR) * dot, (2 + _BAR + _TICK - 1) * dot)
         picture[y, across] = 255
-        _write(picture, f"{value:.3g}", y - 2 * dot, (3 + _BAR + _TICK) * dot, dot)
+        _write(picture, _label(value), y - 2 * dot, (3 + _BAR + _TICK) * dot, dot)
+
+
+def _label(luminance: float) -> str:
+    """Three digits, in full from a thousand to a million where ``g`` would write 1e+03."""
+    return f"{luminance:.0f}" if 999.5 <= luminance < 1e6 else f"{luminance:.3g}"
 
 
 def _write(picture: Picture, text: str, y: int, x: int, dot: int) -> None:

@@ -19,14 +19,14 @@ HEADLAMP = (0.26, 0.14)  # m, width and height of the glass
 TAIL_LAMP = (0.22, 0.20)
 HEADLAMP_HEIGHT = 0.64  # m above the road
 
-#: The passing beam as a cone whose upper edge is its cut-off, 1 % (0.6 degrees) below the
-#: horizon, and whose exponent, the highest that OpenGL takes, softens the other edges.
+#: The passing beam as a cone with the highest exponent that OpenGL takes, aimed so low that
+#: little is left at the horizon; its edge, at 2 % of the axis, does not show on the road.
 BEAM_DOWN = 10.6
 _BEAM = Light(
     "Headlamp",
     "spot",
     (1.0, 0.95, 0.85),
-    cutoff=10.0,
+    cutoff=14.0,
     exponent=128.0,
     attenuation=(0.5, 0.02, 0.002),
 )

@@ -19,7 +19,9 @@ LANTERN_HEIGHT = 4.15  # m above the arcade's floor
 LUMINAIRE = Light(
     "LuminaireLamp", "spot", SODIUM, cutoff=75.0, exponent=2.0, attenuation=(0.5, 0.05, 0.01)
 )
-LANTERN = Light("ArcadeLamp", "point", WARM_WHITE, attenuation=(0.5, 0.1, 0.05))
+LANTERN = Light(
+    "ArcadeLamp", "spot", WARM_WHITE, cutoff=90.0, attenuation=(0.5, 0.1, 0.05)
+)  # its roof lets no light upwards
 
 
 def luminaire() -> Node:

@@ -83,14 +83,14 @@ _ALL = [
     _glowing("SignalRedLit", (0.20, 0.01, 0.01), (1.0, 0.08, 0.05)),
     _glowing("SignalGreenLit", (0.01, 0.14, 0.08), (0.05, 1.0, 0.6)),
     # cars
-    *(_plain(f"CarPaint{name}", rgb, 0.4, 60.0) for name, rgb in _CAR_COLOURS.items()),
+    *(_plain(f"CarPaint{name}", rgb, 0.2, 60.0) for name, rgb in _CAR_COLOURS.items()),
     _plain("CarGlass", (0.04, 0.05, 0.06), 0.6, 90.0),
     _plain("CarTrim", (0.025, 0.025, 0.025)),
     _plain("Tyre", (0.03, 0.03, 0.03)),
     _plain("Rim", (0.45, 0.46, 0.48), 0.4, 40.0),
     Material("Plate", texture="plate.png"),
-    _plain("HeadlampOff", (0.55, 0.57, 0.60), 0.6, 90.0),
-    _glowing("HeadlampLit", (0.55, 0.57, 0.60), (1.0, 0.97, 0.85)),
+    _plain("HeadlampOff", (0.50, 0.52, 0.55), 0.4, 90.0),
+    _glowing("HeadlampLit", (0.50, 0.52, 0.55), (1.0, 0.97, 0.85)),
     _plain("TailLampOff", (0.30, 0.01, 0.01), 0.4, 60.0),
     _glowing("TailLampLit", (0.30, 0.01, 0.01), (0.8, 0.04, 0.03)),
 ]

@@ -186,7 +186,7 @@ class _Document:
 
 
 def _light(light: Light) -> dict[str, Any]:
-    """A KHR light. A spot's inner angle is set so that its flux is the OpenGL spot's.
+    """A KHR light. A spot's inner angle is set so that its flux is near the OpenGL spot's.
 
     cos^e inside the cut-off c gives 2 pi (1 - cos(c)^(e + 1)) / (e + 1) times the
     candela; KHR's square of a ramp in cos between the cones gives

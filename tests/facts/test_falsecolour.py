@@ -64,14 +64,21 @@ def test_legend_shows_the_colours_of_the_picture() -> None:
 
 def test_legend_is_written_in_digits() -> None:
     picture = np.zeros((*SMALLEST, 3), np.uint8)
-    paint_legend(picture, 1.0, 1.0)
+    paint_legend(picture, 1000.0, 2.0)
     dots = picture.max(axis=-1) == 255
-    # The bar ends in 1 at the top and 0.1 at the bottom: the glyph "1" is 2 6 2 2 7.
-    one = np.array([[0, 1, 0], [1, 1, 0], [0, 1, 0], [0, 1, 0], [1, 1, 1]], bool)
-    windows = np.lib.stride_tricks.sliding_window_view(dots, one.shape)
-    found = (windows == one).all(axis=(-1, -2))
-    assert found[SMALLEST[0] // 4 : SMALLEST[0] // 2 + 4].any()
-    assert found[SMALLEST[0] // 2 + 4 :].any()
+    # Rows of dots, as on any small display: 1000 at the top of the bar, 10 at its foot.
+    one = np.array([[0, 1, 0], [1, 1, 0], [0, 1, 0], [0, 1, 0], [1, 1, 1]])
+    zero = np.array([[1, 1, 1], [1, 0, 1], [1, 0, 1], [1, 0, 1], [1, 1, 1]])
+    space = np.zeros((5, 1), int)
+    thousand = np.hstack([one, space, zero, space, zero, space, zero, space]).astype(bool)
+    ten = np.hstack([one, space, zero, np.zeros((5, 5), int)]).astype(bool)
+
+    def rows_with(text: np.ndarray) -> list[int]:
+        windows = np.lib.stride_tricks.sliding_window_view(dots, text.shape)
+        return np.unique(np.nonzero((windows == text).all(axis=(-1, -2)))[0]).tolist()
+
+    (top,), (foot,) = rows_with(thousand), rows_with(ten)
+    assert top < foot
 
 
 @given(st.floats(1e-9, 1e12), st.floats(0.1, 20.0), st.integers(0, 900), st.integers(0, 1600))

@@ -210,3 +210,19 @@ def old_group(*children: str, fields: str = "", kind: str = "Group") -> str:
     """A node with children in the older syntax."""
     inside = "\n".join(children)
     return f"{kind} {{\n{fields}\nnum_children {len(children)}\n{inside}\n}}\n"
+
+
+# --- a square in a state ------------------------------------------------------------------
+
+UVS = coordinates("0 0 \n1 0 \n1 1 \n0 1")
+
+
+def dressed(folder: Path, state: str, *, more: str = UVS) -> Loaded:
+    """A square in a Geode with a StateSet."""
+    return load(folder, scene(geode(geometry(more=more), fields=state)))
+
+
+def old_dressed(folder: Path, state: str, before: str = "") -> Loaded:
+    """A square in a Geode with a StateSet in the older syntax."""
+    body = f"StateSet {{\n{state}\n}}"
+    return load(folder, old_geode(old_geometry(before=before), fields=body))

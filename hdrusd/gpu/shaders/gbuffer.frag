@@ -3,7 +3,7 @@
 // not be sampled, and a software device samples both sides of a branch.
 #include "photometry/reflectance.glsl"
 
-in vec3 position;
+in float depth;
 in vec3 normal;
 #ifdef VERTEX_COLOR
 in vec3 color;
@@ -53,11 +53,10 @@ uniform Map opacity_map;
 uniform sampler2D opacity_image;
 #endif
 
-layout(location = 0) out vec4 g_position;  // m, relative to the eye; shininess
-layout(location = 1) out vec4 g_normal;    // unit; opacity
-layout(location = 2) out vec4 g_diffuse;   // reflectance; 0
-layout(location = 3) out vec4 g_specular;  // reflectance; 0
-layout(location = 4) out vec4 hdr;         // cd/m2; 1
+layout(location = 0) out vec4 g_normal;    // unit normal; distance along the view axis, m
+layout(location = 1) out vec4 g_diffuse;   // reflectance; shininess
+layout(location = 2) out vec4 g_specular;  // reflectance; opacity
+layout(location = 3) out vec4 hdr;         // cd/m2; 1
 
 void main()
 {
@@ -80,9 +79,9 @@ void main()
 #endif
     vec3 n = normalize(normal) * (gl_FrontFacing ? 1.0 : back_sign);
     vec3 rho = base * (1.0 - metallic);
-    g_position = vec4(position, shininess);
-    g_normal = vec4(n, alpha);
-    g_diffuse = vec4(rho, 0.0);
-    g_specular = vec4(mix(specular, base, metallic), 0.0);
+    vec3 ks = mix(specular, base, metallic);
+    g_normal = vec4(n, depth);
+    g_diffuse = vec4(rho, shininess);
+    g_specular = vec4(ks, alpha);
     hdr = vec4(max(glow, 0.0) + lambert(rho, ambient, lambert_scale), 1.0);
 }

@@ -2,54 +2,70 @@
 // added up over one batch of lights. Result in cd/m2.
 #include "photometry/light.glsl"
 #include "photometry/reflectance.glsl"
+#include "gpu/shaders/gbuffer.glsl"
 
-uniform sampler2D g_position, g_normal, g_diffuse, g_specular;
-uniform float lambert_scale;  // 1/pi, or 1 for petit2010
-uniform vec3 toward_eye;      // orthographic: unit vector to the eye; perspective: zero
-
+in vec2 window;
 flat in vec4 data[BATCH * ROWS];
 layout(location = 0) out vec4 hdr;
 
-// Rows of a light: position, w | intensity rgb, radius | axis, exponent | inner, outer, -, -
-#ifdef CONES
-#define CONE(i) * cone_factor(-dot(l, data[(i) * ROWS + 2].xyz), data[(i) * ROWS + 3].x, \
-                              data[(i) * ROWS + 3].y, data[(i) * ROWS + 2].w)
+// Rows of a light: position, w | intensity rgb, 1/radius^2 | axis, exponent | inner, 1/width, 0, 0.
+// With CONES (and no exponent): position, 1/radius^2 | intensity rgb, inner | axis, 1/width.
+#if defined(FOCUS)
+#define POSITION(i) data[(i) * ROWS].xyz, data[(i) * ROWS].w
+#define INVERSE_RADIUS2(i) data[(i) * ROWS + 1].w
+#define SHAPE(i) * cone_factor(-dot(l, data[(i) * ROWS + 2].xyz), data[(i) * ROWS + 3].x, \
+                               data[(i) * ROWS + 3].y) \
+                 * focus_factor(-dot(l, data[(i) * ROWS + 2].xyz), data[(i) * ROWS + 2].w)
+#elif defined(CONES)
+#define POSITION(i) data[(i) * ROWS].xyz, 1.0
+#define INVERSE_RADIUS2(i) data[(i) * ROWS].w
+#define SHAPE(i) * cone_factor(-dot(l, data[(i) * ROWS + 2].xyz), data[(i) * ROWS + 1].w, \
+                               data[(i) * ROWS + 2].w)
 #else
-#define CONE(i)
+#define POSITION(i) data[(i) * ROWS].xyz, data[(i) * ROWS].w
+#define INVERSE_RADIUS2(i) data[(i) * ROWS + 1].w
+#define SHAPE(i)
 #endif
 
-#define SHADE(i) { \
-    vec3 l = light_vector(data[(i) * ROWS].xyz, data[(i) * ROWS].w, p); \
-    float d2 = max(dot(l, l), 1e-20); \
-    l *= inversesqrt(d2); \
+#define LIGHT(i) \
+    vec3 l = light_vector(POSITION(i), p); \
+    float inverse_d = inversesqrt(max(dot(l, l), 1e-20)); \
+    l *= inverse_d; \
     float nl = dot(n, l); \
-    float e = illuminance(nl, d2, data[(i) * ROWS + 1].w) CONE(i); \
-    vec3 lux = data[(i) * ROWS + 1].xyz * e; \
-    sum += lux; \
-    if (glossy && e > 0.0) { \
-        float nh = half_cosine(nl, nv, dot(l, v)); \
-        gloss += lux * blinn_phong(nh, shininess, lambert_scale); \
-    } }
+    vec3 lux = data[(i) * ROWS + 1].xyz * (illuminance(nl, inverse_d * inverse_d, INVERSE_RADIUS2(i)) SHAPE(i));
+
+#define DIFFUSE(i) { LIGHT(i) sum += lux; }
+#define GLOSS(i) { LIGHT(i) sum += lux; \
+    gloss += lux * blinn_phong(half_cosine(nl, nv, dot(l, v)), shininess, lambert_scale); }
+
+#if BATCH == 7
+#define ALL(X) X(0) X(1) X(2) X(3) X(4) X(5) X(6)
+#elif BATCH == 10
+#define ALL(X) X(0) X(1) X(2) X(3) X(4) X(5) X(6) X(7) X(8) X(9)
+#else
+#define ALL(X) X(0) X(1) X(2) X(3) X(4) X(5) X(6) X(7) X(8) X(9) X(10) X(11) X(12) X(13) X(14)
+#endif
+
+uniform float lambert_scale;  // 1/pi, or 1 for petit2010
 
 void main()
 {
-    ivec2 pixel = ivec2(gl_FragCoord.xy);
-    vec4 position = texelFetch(g_position, pixel, 0);
-    vec3 p = position.xyz;
-    float shininess = position.w;
-    vec3 n = texelFetch(g_normal, pixel, 0).xyz;
-    vec3 rho = texelFetch(g_diffuse, pixel, 0).rgb;
-    vec3 ks = texelFetch(g_specular, pixel, 0).rgb;
-    vec3 v = toward_eye == vec3(0.0) ? -normalize(p) : toward_eye;
+    float depth;
+    vec3 n = g_normal_at(window, depth);
+    vec3 p = g_position_at(window, depth);
+    vec4 diffuse = textureLod(g_diffuse, window, 0.0);
+    vec3 rho = diffuse.rgb;
+    vec3 sum = vec3(0.0);
+#ifdef GLOSSY
+    float shininess = diffuse.w;
+    vec3 gloss = vec3(0.0);
+    vec3 v = g_toward_eye(p);
     float nv = dot(n, v);
-    bool glossy = ks.r + ks.g + ks.b > 0.0;
-    vec3 sum = vec3(0.0), gloss = vec3(0.0);
-    SHADE(0)
-#if BATCH > 1
-    SHADE(1) SHADE(2) SHADE(3) SHADE(4) SHADE(5) SHADE(6)
+    ALL(GLOSS)
+    hdr = vec4(lambert(rho, sum, lambert_scale)
+               + textureLod(g_specular, window, 0.0).rgb * gloss, 0.0);
+#else
+    ALL(DIFFUSE)
+    hdr = vec4(lambert(rho, sum, lambert_scale), 0.0);
 #endif
-#if BATCH > 7
-    SHADE(7) SHADE(8) SHADE(9) SHADE(10) SHADE(11) SHADE(12) SHADE(13) SHADE(14)
-#endif
-    hdr = vec4(lambert(rho, sum, lambert_scale) + ks * gloss, 0.0);
 }
