@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.gpu.buffers import corner_buffer, instance_rows, mirrored
+from hdrusd.gpu.buffers import corner_buffer, instance_rows, mirrored, weld
 from hdrusd.gpu.program import Programs
 from hdrusd.gpu.textures import TextureCache
 from hdrusd.scene import Draw, Geometry, Material, RenderScene, TextureUse
@@ -32,14 +32,15 @@ class _Uploaded:
 
     geometry: Geometry
     vao: moderngl.VertexArray
-    vertices: moderngl.Buffer
+    buffers: tuple[moderngl.Buffer, ...]
     instances: moderngl.Buffer
     capacity: int
     used: int
 
     def release(self) -> None:
-        for thing in (self.vao, self.vertices, self.instances):
-            thing.release()
+        self.vao.release()
+        for buffer in (*self.buffers, self.instances):
+            buffer.release()
 
 
 class SurfacePass:
@@ -111,9 +112,7 @@ class SurfacePass:
             uploaded.instances.write(chosen)
             set_used(program, "handedness", -1.0 if mirror else 1.0)
             ctx.front_face = "cw" if mirror else "ccw"
-            uploaded.vao.render(
-                moderngl.TRIANGLES, len(draw.geometry.points), instances=len(chosen)
-            )
+            uploaded.vao.render(moderngl.TRIANGLES, instances=len(chosen))
 
     def _upload(
         self, draw: Draw, program: moderngl.Program, material: Material, mirror: bool, count: int
@@ -133,7 +132,8 @@ class SurfacePass:
             kept.release()
         color = material.vertex_color if material.vertex_color in draw.geometry.colors else ""
         data, content = corner_buffer(draw.geometry, material.uv_sets(), color)
-        vertices = self.ctx.buffer(data)
+        welded, indices = weld(data)
+        vertices, elements = self.ctx.buffer(welded), self.ctx.buffer(indices)
         instances = self.ctx.buffer(reserve=count * 48)
         used = [(part, name) for part, name in content if name in program]
         layout = " ".join(
@@ -145,8 +145,10 @@ class SurfacePass:
                 (vertices, layout, *(name for _, name in used)),
                 (instances, "4f 4f 4f /i", "in_row0", "in_row1", "in_row2"),
             ],
+            elements,
         )
-        self._kept[key] = _Uploaded(draw.geometry, vao, vertices, instances, count, self._frame)
+        buffers = (vertices, elements)
+        self._kept[key] = _Uploaded(draw.geometry, vao, buffers, instances, count, self._frame)
         return self._kept[key]
 
     def _drop_unused(self) -> None:
@@ -197,4 +199,4 @@ def set_used(program: moderngl.Program, name: str, value: object) -> None:
     """Set a uniform, unless the compiler found it unused and removed it."""
     member = program.get(name, None)
     if member is not None:
-        member.value = value  # type: ignore[union-attr, assignment]
+        member.value = value  # type: ignore[union-attr]

@@ -7,7 +7,6 @@ recorded. Each step that changes or guesses something is a finding.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -74,7 +73,7 @@ class Interpreter:
         intensity, provenance, name, source = self._strength(light, rule, kind, strength)
         if rule is not None:
             color = rule_color(rule, self.temperature) or color
-        if intensity == 0.0:
+        if intensity <= 0.0:
             self._note(light, Kind.DROPPED, "light-dark", "gives no light; not written")
             return None
         if not intensity <= _STRONGEST:
@@ -178,7 +177,7 @@ class Interpreter:
                 source=rule.source,
             )
         value = self.estimate.ambient * strength
-        if value == 0.0:
+        if value <= 0.0:
             self._note(light, Kind.DROPPED, "light-dark", "gives no light; not written")
             return None
         self._note(

@@ -51,8 +51,8 @@ class Gprim:
     double_sided: bool
     shape_varies: bool
     place_varies: bool
+    hides: bool  # its visibility may change in time
     matrix: npt.NDArray[np.float64] | None = None  # (k, 4, 4) scene units, where it is kept
-    copies: npt.NDArray[np.float64] | None = None  # of a PointInstancer, before ``prim``'s own
 
 
 @dataclass(slots=True)
@@ -61,6 +61,7 @@ class Light:
 
     prim: Usd.Prim
     varies: bool
+    hides: bool
     row: npt.NDArray[np.void] | None = None
 
 
@@ -70,6 +71,7 @@ class _Plan:
     lights: list[Light] = field(default_factory=list)
     domes: list[Usd.Prim] = field(default_factory=list)
     instancers: list[Usd.Prim] = field(default_factory=list)
+    prototypes: dict[Sdf.Path, Gprim | None] = field(default_factory=dict)
 
 
 class StageReader:
@@ -96,6 +98,7 @@ class StageReader:
         self._material_ids: dict[Sdf.Path | tuple[str, ...], int] = {}
         self._material_reader = MaterialReader(stage, report)
         self._plan: _Plan | None = None
+        self._cameras: dict[str | None, Usd.Prim | None] = {}
         self._geometries: dict[tuple[str, int], Geometry | None] = {}
 
     def read(self, time: float, camera: Camera, *, sky_visible: bool = False) -> RenderScene:
@@ -156,15 +159,19 @@ class StageReader:
 
         Raises InputError when it is named and not there.
         """
+        if path in self._cameras:
+            return self._cameras[path]
         cameras = [
             prim
             for prim in Usd.PrimRange(self.stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
             if prim.IsA(UsdGeom.Camera)
         ]
         if path is None:
-            return cameras[0] if cameras else None
+            self._cameras[path] = cameras[0] if cameras else None
+            return self._cameras[path]
         for prim in cameras:
             if path in (str(prim.GetPath()), prim.GetName()):
+                self._cameras[path] = prim
                 return prim
         known = ", ".join(str(prim.GetPath()) for prim in cameras) or "none"
         raise InputError(self._place(), f"{path}: no such camera; the stage has {known}")
@@ -204,7 +211,7 @@ class StageReader:
             plan.domes.append(prim)
         elif prim.IsA(UsdLux.NonboundableLightBase) or prim.IsA(UsdLux.BoundableLightBase):
             varies = light_time_varying(prim) or _place_varies(prim)
-            plan.lights.append(Light(prim, varies))
+            plan.lights.append(Light(prim, varies, _hides(prim)))
         else:
             self._finding(
                 Kind.DROPPED, "light-unknown", f"{prim.GetTypeName()} light is not shown", prim
@@ -222,12 +229,13 @@ class StageReader:
             double_sided=bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get()),
             shape_varies=time_varying(prim),
             place_varies=_place_varies(prim),
+            hides=_hides(prim),
         )
 
     def _pieces(self, prim: Usd.Prim, code: Usd.TimeCode) -> list[Piece]:
         """The material of each face: subsets of family materialBind, and the rest."""
         binding = UsdShade.MaterialBindingAPI(prim)
-        subsets = [s for s in binding.GetMaterialBindSubsets()]
+        subsets = list(binding.GetMaterialBindSubsets())
         whole = Piece(None, self._material(prim, binding, code))
         if not subsets:
             return [whole]
@@ -270,12 +278,12 @@ class StageReader:
     # -- one frame -----------------------------------------------------------------------
 
     def _light(self, light: Light, cache: UsdGeom.XformCache) -> npt.NDArray[np.void] | None:
-        if not _visible(light.prim, cache.GetTime()):
+        if light.hides and not _visible(light.prim, cache.GetTime()):
             return None
         if light.row is None or light.varies:
             world = cache.GetLocalToWorldTransform(light.prim)
             row = read_light_row(light.prim, cache.GetTime(), world, self.unit, self.report)
-            if row is None or not all(np.isfinite(row[name]).all() for name in row.dtype.names):
+            if row is None or not all(np.isfinite(row[name]).all() for name in LIGHT.fields or ()):
                 self._finding(Kind.INVALID, "light-invalid", "not finite; left out", light.prim)
                 return None
             light.row = row
@@ -299,7 +307,7 @@ class StageReader:
         return r, g, b
 
     def _draws(self, gprim: Gprim, cache: UsdGeom.XformCache, code: Usd.TimeCode) -> Iterable[Draw]:
-        if not _visible(gprim.prim, code):
+        if gprim.hides and not _visible(gprim.prim, code):
             return
         if gprim.matrix is None or gprim.place_varies:
             gprim.matrix = self._to_metres(cache.GetLocalToWorldTransform(gprim.prim))[None]
@@ -331,7 +339,7 @@ class StageReader:
     ) -> Iterable[Draw]:
         world = cache.GetLocalToWorldTransform(prim)
         for source, copies in instancer_draws(prim, code, self.purposes, self.report):
-            gprim = self._plan_gprim(source, code)
+            gprim = self._prototype(source, code)
             if gprim is None:
                 continue
             self._read_geometry(gprim, code)
@@ -339,6 +347,13 @@ class StageReader:
             for piece in gprim.pieces:
                 if piece.geometry is not None:
                     yield Draw(piece.geometry, piece.material, matrices, gprim.double_sided)
+
+    def _prototype(self, prim: Usd.Prim, code: Usd.TimeCode) -> Gprim | None:
+        assert self._plan is not None
+        known = self._plan.prototypes
+        if prim.GetPath() not in known:
+            known[prim.GetPath()] = self._plan_gprim(prim, code)
+        return known[prim.GetPath()]
 
     def _to_metres(self, matrix: Gf.Matrix4d) -> npt.NDArray[np.float64]:
         result = np.array(matrix, np.float64)
@@ -381,6 +396,16 @@ def _sky_luminance(ambient: tuple[float, float, float]) -> tuple[float, float, f
 
 def _visible(prim: Usd.Prim, code: Usd.TimeCode) -> bool:
     return bool(UsdGeom.Imageable(prim).ComputeVisibility(code) != UsdGeom.Tokens.invisible)
+
+
+def _hides(prim: Usd.Prim) -> bool:
+    """Whether the visibility of the prim or of one above it may change in time."""
+    while prim and not prim.IsPseudoRoot():
+        imageable = UsdGeom.Imageable(prim)
+        if imageable and imageable.GetVisibilityAttr().ValueMightBeTimeVarying():
+            return True
+        prim = prim.GetParent()
+    return False
 
 
 def _place_varies(prim: Usd.Prim) -> bool:

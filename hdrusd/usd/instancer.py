@@ -57,8 +57,6 @@ def instancer_draws(
                     f"{source.GetTypeName()} inside a PointInstancer is not shown",
                 )
             elif source.IsA(UsdGeom.Gprim) and imageable.ComputePurpose() in purposes:
+                # IncludeProtoXform has put the root's own transform into the copies.
                 inside, _ = cache.ComputeRelativeTransform(source, root)
-                if source == root:  # IncludeProtoXform holds the root's own
-                    yield source, copies
-                else:
-                    yield source, np.array(inside, np.float64) @ copies
+                yield source, np.array(inside, np.float64) @ copies

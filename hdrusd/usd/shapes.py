@@ -32,7 +32,10 @@ def read_shape(prim: Usd.Prim, time: Usd.TimeCode) -> Shape | None:
     if prim.IsA(UsdGeom.Plane):
         plane = UsdGeom.Plane(prim)
         width, length = plane.GetWidthAttr().Get(time), plane.GetLengthAttr().Get(time)
-        return _plane(float(width), float(length), plane.GetAxisAttr().Get(time))
+        axis = plane.GetAxisAttr().Get(time)
+        # Width lies along x, or z where the axis is X; length along y, or z where it is Y.
+        sides = (width, length) if axis == "Z" else (length, width)
+        return _plane(float(sides[0]), float(sides[1]), axis)
     if prim.IsA(UsdGeom.Sphere):
         radius = float(UsdGeom.Sphere(prim).GetRadiusAttr().Get(time))
         angle = np.linspace(-np.pi / 2, np.pi / 2, SIDES // 2 + 1)
@@ -111,9 +114,9 @@ def _cube(size: float) -> Shape:
     )
 
 
-def _plane(width: float, length: float, axis: str) -> Shape:
+def _plane(first: float, second: float, axis: str) -> Shape:
     corner = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32)
-    corner *= np.array([width / 2, length / 2, 0], np.float32)
+    corner *= np.array([first / 2, second / 2, 0], np.float32)
     return Shape(
         np.asarray(corner[:, _AXES[axis]], np.float32),
         np.array([4], np.int64),

@@ -73,7 +73,9 @@ def _samples(
     for index, (code, value) in enumerate(zip(codes, values, strict=True)):
         if channel.interpolation == "step" and index:
             held = tuple(float(v) for v in values[index - 1])
-            samples.append((float(code) - _STEP, held))
+            # Keys may lie closer than the step is wide.
+            step = min(_STEP, 0.5 * float(code - codes[index - 1]))
+            samples.append((float(code) - step, held))
         samples.append((round(float(code), 6), tuple(float(v) for v in value)))
     return samples
 
@@ -119,6 +121,18 @@ def uniform_scale(world: Gf.Matrix4d) -> tuple[float, bool]:
 
 
 def rigid(world: Gf.Matrix4d) -> Gf.Matrix4d:
-    """The matrix without scale and shear: where a thing is and which way it looks."""
-    result = Gf.Matrix4d(world.ExtractRotationMatrix().GetOrthonormalized(), Gf.Vec3d(0.0))
-    return result.SetTranslateOnly(world.ExtractTranslation())
+    """The matrix without scale and shear: where a thing is and which way it looks.
+
+    Its -Z axis is exactly that of ``world``, as a light's must be; the turn about it
+    is as near as a right angle allows.
+    """
+    x, y, z = (Gf.Vec3d(world.GetRow3(row)) for row in range(3))
+    z = z.GetNormalized() if z.GetLength() > 0.0 else Gf.Vec3d(0.0, 0.0, 1.0)
+    side = x - z * Gf.Dot(x, z)
+    if side.GetLength() <= 1e-9 * x.GetLength():
+        side = Gf.Cross(y, z)
+    if side.GetLength() == 0.0:
+        side = Gf.Cross(z, Gf.Vec3d(0.0, 1.0, 0.0) if abs(z[1]) < 0.9 else Gf.Vec3d(1.0, 0.0, 0.0))
+    side.Normalize()
+    turn = Gf.Matrix3d(*side, *Gf.Cross(z, side), *z)
+    return Gf.Matrix4d(turn, world.ExtractTranslation())
