@@ -56,7 +56,7 @@ class _SceneReader:
         self.scene = LegacyScene(
             resolver.source, "osg", up="Z", unit_m=1.0, generator=document.generator
         )
-        self.described = NodeReader(document)
+        self.described = NodeReader(document, resolver.limits.vertices)
         self.states = StateReader(document)
         self.geometries = GeometryReader(document, resolver.limits.vertices)
         self.materials = MaterialReader(

@@ -71,9 +71,9 @@ class Description:
 class NodeReader:
     """Describes the nodes of one file, each once: a node may be used a thousand times."""
 
-    def __init__(self, document: Document) -> None:
+    def __init__(self, document: Document, point_limit: int) -> None:
         self.document = document
-        self.transforms = TransformReader(document)
+        self.transforms = TransformReader(document, point_limit)
         self._known: dict[int, Description] = {}
 
     def read(self, place: Statement) -> Description:

@@ -172,6 +172,7 @@ class PrimitiveReader:
     ) -> _PrimitiveSet:
         block = None if holder is None else holder.block
         values = np.zeros(0, dtype=np.int64) if block is None else whole(block.numbers())
+        self._spend(len(values), place)
         if declared is not None and declared != len(values):
             self.document.add(
                 Kind.INVALID,
@@ -184,14 +185,16 @@ class PrimitiveReader:
             return _PrimitiveSet(place, mode, None, first, np.maximum(values, 0))
         return _PrimitiveSet(place, mode, values, 0, np.array([len(values)]))
 
+    def _spend(self, corners: int, place: Statement) -> None:
+        self.corners += corners
+        if self.corners > self.limit:
+            raise InputError(self.document.ref(place), f"more than {self.limit} corners in all")
+
     def _polygons(self, item: _PrimitiveSet, elements: int) -> Polygons:
         available = elements if item.elements is None else len(item.elements)
         lengths = self._clamped(item, available)
-        self.corners += int(lengths.sum())
-        if self.corners > self.limit:
-            raise InputError(
-                self.document.ref(item.place), f"more than {self.limit} corners in the file"
-            )
+        if item.elements is None:
+            self._spend(int(lengths.sum()), item.place)
         starts = item.first + np.concatenate([[0], np.cumsum(lengths)[:-1]]).astype(np.int64)
         counts, positions, run = faces(item.mode, starts, lengths)
         corners = positions if item.elements is None else item.elements[positions]

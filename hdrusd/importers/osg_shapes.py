@@ -58,7 +58,10 @@ def read_shape(document: Document, drawable: Statement) -> Mesh | None:
         return None
     text = f"{kind} as {len(counts)} faces, without texture coordinates"
     document.add(Kind.REPLACED, "osg-shape-faces", drawable, name, text)
-    color = document.numbers(drawable, 4, "color") or (1.0, 1.0, 1.0, 1.0)
+    color = np.array([document.numbers(drawable, 4, "color") or (1.0, 1.0, 1.0, 1.0)])
+    if not np.abs(color).max() < largest:
+        document.add(Kind.INVALID, "osg-shape", drawable, name, "colour out of range; white")
+        color = np.ones((1, 4))
     return Mesh(
         name,
         document.ref(drawable),
@@ -67,7 +70,7 @@ def read_shape(document: Document, drawable: Statement) -> Mesh | None:
         indices.astype(np.int32),
         normals=(normals @ rotation).astype(np.float32),
         normals_interpolation="uniform" if kind == "Box" else "vertex",
-        colors=np.array([color], dtype=np.float32),
+        colors=color.astype(np.float32),
         colors_interpolation="constant",
     )
 

@@ -21,6 +21,7 @@ Key = tuple[int, str]
 Hint = Literal["opaque", "transparent"]
 
 NO_UNIT = -1
+_UNITS = 32  # OpenGL numbers GL_TEXTURE0 to GL_TEXTURE31
 _TEXTURE_CLASSES = {
     "Texture",
     "Texture1D",
@@ -147,7 +148,7 @@ class StateReader:
         ):
             listed = document.field(place, key)
             units = listed.block.statements if listed is not None and listed.block else []
-            for unit, statement in enumerate(units):
+            for unit, statement in enumerate(units[:_UNITS]):
                 yield from read(statement, unit)
         for key in ("uniformlist", "definelist", "updatecallback", "eventcallback"):
             found = document.field(place, key)
@@ -177,7 +178,7 @@ class StateReader:
             if statement.key == "textureunit" and len(statement.words) > 1:
                 unit = statement.declared
                 inner = statement.block.statements if statement.block is not None else []
-                for item in inner if unit is not None else []:
+                for item in inner if unit is not None and unit < _UNITS else []:
                     yield from self._old_statement(item, unit or 0)
             else:
                 yield from self._old_statement(statement, NO_UNIT)

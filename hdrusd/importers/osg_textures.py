@@ -60,7 +60,7 @@ class TextureReader:
 
     document: Document
     resolver: Resolver
-    _images: dict[str, Image] = field(default_factory=dict)
+    _images: dict[str | int, Image] = field(default_factory=dict)
     _opaque: set[int] = field(default_factory=set)  # images whose format has no alpha
 
     def read(
@@ -129,7 +129,7 @@ class TextureReader:
             text = "image sequence; its first picture is used"
             document.add(Kind.DROPPED, "osg-image-sequence", holder, name, text)
         if document.field(holder, "data") is not None:
-            key = f"line {holder.line}"
+            key = id(holder)
             if key not in self._images:
                 self._images[key] = self._inline(name or f"inline_{holder.line}", holder)
             return self._images[key]

@@ -16,6 +16,7 @@ from typing import Literal
 
 import numpy as np
 
+from hdrusd.errors import InputError
 from hdrusd.importers.osg_text import Document, Doubles, Statement, listed, triple
 from hdrusd.legacy.scene import TRS, Channel, Vec3
 from hdrusd.report import Kind
@@ -48,10 +49,15 @@ class Placement:
 
 
 class TransformReader:
-    """Reads the transforms of one file."""
+    """Reads the transforms of one file; counts control points against ``limit`` over all of it.
 
-    def __init__(self, document: Document) -> None:
+    The count is needed because one path may stand for many by reference.
+    """
+
+    def __init__(self, document: Document, limit: int) -> None:
         self.document = document
+        self.limit = limit
+        self.points = 0
 
     def read(self, node: Statement, name: str) -> Placement:
         """The placement of any node; identity for those that are no transforms."""
@@ -196,7 +202,13 @@ class TransformReader:
         document = self.document
         path = document.object(callback, "animationpath")
         points = np.zeros((0, 11)) if path is None else self._control_points(path)
-        lengths = np.sqrt((points[:, 4:8] ** 2).sum(axis=1)) if len(points) else np.zeros(0)
+        self.points += len(points)
+        if self.points > self.limit:
+            raise InputError(
+                document.ref(callback), f"more than {self.limit} control points in all"
+            )
+        with np.errstate(over="ignore"):
+            lengths = np.sqrt((points[:, 4:8] ** 2).sum(axis=1))
         good = np.isfinite(points).all(axis=1) & (lengths > 0.0) & np.isfinite(lengths)
         if not good.all():
             text = f"{int((~good).sum())} control points are no numbers or do not turn; left out"

@@ -1,4 +1,4 @@
-"""Lights: ``write_light`` from photometry, ``read_light`` back, and ``read_light_row`` for shader 1.
+"""Lights: ``write_light`` from photometry, ``read_light`` back, ``read_light_row`` for shader 1.
 
 The photometric attributes are the truth; plain UsdLux values that mean the same
 stand beside them for every other renderer: nits, ``normalize`` 0, a real radius

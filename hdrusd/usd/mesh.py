@@ -90,15 +90,13 @@ class GeometryReader:
 
     def _read_mesh(self, mesh: UsdGeom.Mesh) -> None:
         time = self.time
-        points, counts, indices = (
-            np.asarray(value if value is not None else [])
-            for value in (
-                mesh.GetPointsAttr().Get(time),
-                mesh.GetFaceVertexCountsAttr().Get(time),
-                mesh.GetFaceVertexIndicesAttr().Get(time),
-            )
+        points = _rows(mesh.GetPointsAttr().Get(time), 3)
+        counts, indices = (
+            _integers(a.Get(time))
+            for a in (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr())
         )
-        self.points = points.reshape(-1, 3).astype(np.float32)
+        if points is not None:
+            self.points = points.astype(np.float32)
         self.faces = counts.size
         try:
             tri = corners(counts, indices, left_handed=self._left_handed())
@@ -110,10 +108,9 @@ class GeometryReader:
             self._finding(Kind.INVALID, "mesh-index", "faces name points that are not there; left")
             keep = ~bad.any(axis=1)
             tri = Corners(tri.vertex[keep], tri.corner[keep], tri.face[keep])
-        holes = mesh.GetHoleIndicesAttr().Get(time)
-        if holes:
+        index = _integers(mesh.GetHoleIndicesAttr().Get(time))
+        if index.size:
             solid = np.ones(self.faces, np.bool_)
-            index = np.asarray(holes)
             solid[index[(index >= 0) & (index < self.faces)]] = False
             tri = tri.select(solid)
         finite = np.isfinite(self.points).all(axis=1)
@@ -131,20 +128,28 @@ class GeometryReader:
         """primvars:normals, then normals; else flat for polygons, smooth for a subdivision cage."""
         primvar = UsdGeom.PrimvarsAPI(self.prim).GetPrimvar("normals")
         if primvar and primvar.HasValue():
-            values = np.asarray(primvar.ComputeFlattened(self.time))
+            values, stated = _rows(primvar.ComputeFlattened(self.time), 3), True
             interpolation = str(primvar.GetInterpolation())
         else:
-            values = np.asarray(mesh.GetNormalsAttr().Get(self.time) or [])
+            given = mesh.GetNormalsAttr().Get(self.time)
+            values, stated = _rows(given, 3), bool(given)
             interpolation = str(mesh.GetNormalsInterpolation())
         smooth = mesh.GetSubdivisionSchemeAttr().Get() != UsdGeom.Tokens.none
 
         def normals(tri: Corners) -> Floats:
-            taken = tri.take(values, interpolation) if values.size else None
-            if taken is not None:
-                return taken
-            if values.size:
-                self._finding(Kind.INVALID, "mesh-normals", "normals do not fit the mesh; computed")
-            return (smooth_normals if smooth else face_normals)(self.points, tri)
+            taken = None if values is None else tri.take(values, interpolation)
+            if taken is None:
+                if stated:
+                    text = "normals do not fit the mesh; computed"
+                    self._finding(Kind.INVALID, "mesh-normals", text)
+                return (smooth_normals if smooth else face_normals)(self.points, tri)
+            length = np.linalg.norm(taken.astype(np.float64), axis=1)
+            usable = (length > 1e-9) & (length < 1e9)  # False for NaN; float32 can square these
+            if not usable.all():
+                text = "normals without a direction; those of the faces are used there"
+                self._finding(Kind.INVALID, "mesh-normals", text)
+                taken = np.where(usable[:, None], taken, face_normals(self.points, tri))
+            return taken
 
         self._normals = normals
 
@@ -189,14 +194,29 @@ class GeometryReader:
         primvar = UsdGeom.PrimvarsAPI(self.prim).FindPrimvarWithInheritance(name)
         if not primvar or not primvar.HasValue():
             return None
-        flat = np.asarray(primvar.ComputeFlattened(self.time))
-        if flat.dtype.kind not in "fiu":
-            return None
-        values = flat.reshape(-1, flat.shape[-1] if flat.ndim > 1 else 1)
-        if values.shape[1] < width:
+        values = _rows(primvar.ComputeFlattened(self.time), width)
+        if values is None:
             return None
         return tri.take(values[:, :width], str(primvar.GetInterpolation()))
 
     def _finding(self, kind: Kind, code: str, text: str) -> None:
         place = SourceRef(Path(self.prim.GetStage().GetRootLayer().identifier))
         self.report.add(kind, code, place, str(self.prim.GetPath()), text)
+
+
+def _rows(value: object, width: int) -> npt.NDArray[np.generic] | None:
+    """An array attribute as (n, at least ``width``) numbers; None where it is anything else.
+
+    A layer may give a schema's attribute another type, and a primvar indices that lead nowhere.
+    """
+    array = np.asarray(value if value is not None else [])
+    if array.ndim == 0 or array.size == 0 or array.dtype.kind not in "fiu":
+        return None
+    rows = array.reshape(len(array), -1)
+    return rows if rows.shape[1] >= width else None
+
+
+def _integers(value: object) -> npt.NDArray[np.int64]:
+    rows = _rows(value, 1)
+    whole = rows is not None and rows.shape[1] == 1 and rows.dtype.kind in "iu"
+    return rows.ravel().astype(np.int64) if rows is not None and whole else np.zeros(0, np.int64)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
-from pxr import Gf, Usd, UsdShade
+import numpy.typing as npt
+from pxr import Gf, Sdf, Usd, UsdShade
 
 from hdrusd.errors import SourceRef
 from hdrusd.report import Kind, Report
-from hdrusd.scene import Material, TextureRef, TextureUse
+from hdrusd.scene import RGB, Material, TextureRef, TextureUse
 from hdrusd.usd.assets import resolved_asset
 from hdrusd.usd.lux import connection_end
 
@@ -25,7 +27,7 @@ _CHANNELS = {"rgb": -1, "r": 0, "g": 1, "b": 2, "a": 3, "rgba": -1}
 
 
 def shininess_from_roughness(roughness: float) -> float:
-    """Blinn-Phong exponent of a preview surface roughness: alpha = roughness^2, n = 2/alpha^2 - 2."""
+    """Blinn-Phong exponent n = 2 / alpha^2 - 2, with alpha = roughness^2 of a preview surface."""
     alpha = max(roughness, 1e-3) ** 2
     return min(max(2.0 / (alpha * alpha) - 2.0, 0.0), _MAX_SHININESS)
 
@@ -52,11 +54,11 @@ class MaterialReader:
             return None
         surface = _Node(shader, time)
         self._note_unused(prim, surface)
-        diffuse, diffuse_map, primvar = self._color(prim, surface, "diffuseColor", (0.18,) * 3)
-        emission, emission_map, _ = self._color(prim, surface, "emissiveColor", (0.0,) * 3)
+        diffuse, diffuse_map = self._color(prim, surface, "diffuseColor", (0.18, 0.18, 0.18))
+        emission, emission_map = self._color(prim, surface, "emissiveColor", (0.0, 0.0, 0.0))
         opacity_map = self._texture(prim, surface, "opacity")
-        opacity = float(surface.value("opacity", 1.0))
-        threshold = float(surface.value("opacityThreshold", 0.0))
+        opacity = self._number(prim, surface, "opacity", 1.0)
+        threshold = self._number(prim, surface, "opacityThreshold", 0.0)
         if threshold <= 0.0 and (opacity < 1.0 or opacity_map is not None):
             threshold = 0.5
             self._finding(
@@ -70,6 +72,9 @@ class MaterialReader:
             shininess = ours.shininess
         if ours.specular is not None:
             specular, metallic = ours.specular, 0.0
+        primvar = _primvar(surface, "diffuseColor")
+        if primvar and primvar == ours.vertex_color and ours.diffuse is not None:
+            diffuse = ours.diffuse  # R = D V; the network has no node that multiplies
         return Material(
             diffuse=diffuse,
             diffuse_map=diffuse_map,
@@ -84,45 +89,61 @@ class MaterialReader:
             opacity_threshold=threshold,
         )
 
-    def _specular(self, prim: Usd.Prim, surface: _Node) -> tuple[tuple[float, float, float], float]:
-        if int(surface.value("useSpecularWorkflow", 0)) == 1:
-            color, used, _ = self._color(prim, surface, "specularColor", (0.0,) * 3)
+    def _specular(self, prim: Usd.Prim, surface: _Node) -> tuple[RGB, float]:
+        if surface.value("useSpecularWorkflow", 0) == 1:
+            color, used = self._color(prim, surface, "specularColor", (0.0, 0.0, 0.0))
             if used is not None:
                 self._finding(prim, "specular-texture", "specularColor texture is not used")
             return color, 0.0
-        ior = float(surface.value("ior", 1.5))
+        ior = max(self._number(prim, surface, "ior", 1.5), 0.0)
         f0 = ((1.0 - ior) / (1.0 + ior)) ** 2
         return (f0, f0, f0), self._factor(prim, surface, "metallic", 0.0)
 
     def _factor(self, prim: Usd.Prim, surface: _Node, name: str, default: float) -> float:
-        """A float input; a texture on it has no term yet and the input's own value holds."""
+        """An input from 0 to 1; a texture on it has no term yet, and the default holds."""
         if self._texture(prim, surface, name) is not None:
             self._finding(prim, f"{name}-texture", f"{name} texture is not used; {default} is")
             return default
-        return float(np.clip(surface.value(name, default), 0.0, 1.0))
+        return min(max(self._number(prim, surface, name, default), 0.0), 1.0)
+
+    def _number(self, prim: Usd.Prim, node: _Node, name: str, default: float) -> float:
+        (value,) = self._numbers(prim, node, name, (default,))
+        return value
+
+    def _numbers(
+        self, prim: Usd.Prim, node: _Node, name: str, default: tuple[float, ...]
+    ) -> tuple[float, ...]:
+        """Finite numbers; the default where a layer gives the input something else."""
+        value = node.value(name, default)
+        array = np.ravel(np.asarray(value))
+        if array.dtype.kind in "fiub" and len(array) == len(default) and np.isfinite(array).all():
+            return tuple(float(v) for v in array)
+        text = f"{name} {shorten(str(value), 60)}; want {len(default)} finite numbers"
+        self._finding(prim, "value-invalid", text, Kind.INVALID)
+        return default
 
     def _note_unused(self, prim: Usd.Prim, surface: _Node) -> None:
         for name, off in _UNUSED.items():
-            if surface.connected(name) or abs(float(surface.value(name, off)) - off) > 1e-6:
+            used = surface.connected(name)
+            if used or abs(self._number(prim, surface, name, off) - off) > 1e-6:
                 self._finding(prim, f"{name}-unused", f"{name} is not shown")
         if surface.connected("normal"):
             self._finding(prim, "normal-map-unused", "normal map is not shown")
 
     def _color(
-        self, prim: Usd.Prim, surface: _Node, name: str, default: tuple[float, ...]
-    ) -> tuple[tuple[float, float, float], TextureUse | None, str]:
-        """A colour input as (constant, texture, primvar that gives it)."""
-        source = surface.source(name)
-        if source is not None and str(source.GetIdAttr().Get()).startswith("UsdPrimvarReader_"):
-            varname = source.GetInput("varname")
-            primvar = str(varname.Get() or "") if varname else ""
-            return (1.0, 1.0, 1.0), None, primvar
-        value = surface.value(name, default)
-        r, g, b = (float(v) for v in value)
-        if not all(math.isfinite(v) and v >= 0.0 for v in (r, g, b)):
-            self._finding(prim, "color-invalid", f"{name} {tuple(value)}; want finite values >= 0")
-            r, g, b = (max(v, 0.0) if math.isfinite(v) else 0.0 for v in (r, g, b))
-        return (r, g, b), self._texture(prim, surface, name), ""
+        self, prim: Usd.Prim, surface: _Node, name: str, default: RGB
+    ) -> tuple[RGB, TextureUse | None]:
+        """A colour input as (constant, texture). A primvar on diffuseColor is a factor on white."""
+        if _primvar(surface, name):
+            if name == "diffuseColor":
+                return (1.0, 1.0, 1.0), None
+            self._finding(prim, "node-unknown", f"{name}: primvar is not read; {default} is used")
+            return default, None
+        value = self._numbers(prim, surface, name, default)
+        r, g, b = (max(v, 0.0) for v in value)
+        if (r, g, b) != value:
+            self._finding(prim, "color-invalid", f"{name} {value}; want 0 or more", Kind.INVALID)
+        return (r, g, b), self._texture(prim, surface, name)
 
     def _texture(self, prim: Usd.Prim, surface: _Node, name: str) -> TextureUse | None:
         source = surface.source(name)
@@ -136,10 +157,12 @@ class MaterialReader:
             return None
         texture = _Node(source, surface.time)
         asset = texture.value("file", None)
-        if asset is None or not asset.path:
-            self._finding(prim, "texture-missing", f"{name}: texture names no file", Kind.MISSING)
         attribute = texture.producer("file")
-        file = resolved_asset(attribute, asset) if asset and attribute else ""
+        file = ""
+        if isinstance(asset, Sdf.AssetPath) and asset.path and attribute is not None:
+            file = resolved_asset(attribute, asset)
+        else:
+            self._finding(prim, "texture-missing", f"{name}: texture names no file", Kind.MISSING)
         space = str(texture.value("sourceColorSpace", "auto"))
         decode = {"raw": "linear", "sRGB": "gamma"}.get(space, "auto")
         uv_set, matrix = self._coordinates(prim, texture)
@@ -152,10 +175,10 @@ class MaterialReader:
             ),
             uv_set=uv_set,
             matrix=matrix,
-            scale=_four(texture.value("scale", (1, 1, 1, 1))),
-            bias=_four(texture.value("bias", (0, 0, 0, 0))),
+            scale=self._four(prim, texture, "scale", (1.0, 1.0, 1.0, 1.0)),
+            bias=self._four(prim, texture, "bias", (0.0, 0.0, 0.0, 0.0)),
             channel=_CHANNELS.get(surface.output(name), -1),
-            fallback=_four(texture.value("fallback", (0, 0, 0, 1))),
+            fallback=self._four(prim, texture, "fallback", (0.0, 0.0, 0.0, 1.0)),
         )
 
     def _coordinates(self, prim: Usd.Prim, texture: _Node) -> tuple[str, tuple[float, ...]]:
@@ -174,24 +197,40 @@ class MaterialReader:
                 self._finding(prim, "node-unknown", f"st: {kind} is not read; st is used")
                 break
             matrix = matrix @ transform_2d(
-                inner.value("scale", (1, 1)),
-                float(inner.value("rotation", 0.0)),
-                inner.value("translation", (0, 0)),
+                self._numbers(prim, inner, "scale", (1.0, 1.0)),
+                self._number(prim, inner, "rotation", 0.0),
+                self._numbers(prim, inner, "translation", (0.0, 0.0)),
             )
             node = inner.source("in")
         return "st", tuple(float(v) for v in matrix[:2].ravel())
+
+    def _four(
+        self, prim: Usd.Prim, node: _Node, name: str, default: tuple[float, ...]
+    ) -> tuple[float, float, float, float]:
+        r, g, b, a = self._numbers(prim, node, name, default)
+        return r, g, b, a
 
     def _finding(self, prim: Usd.Prim, code: str, text: str, kind: Kind = Kind.DROPPED) -> None:
         self.report.add(kind, code, self.place, str(prim.GetPath()), text)
 
 
-def transform_2d(scale: Any, rotation: float, translation: Any) -> np.ndarray:  # type: ignore[type-arg]
-    """(3, 3) column-vector matrix of UsdTransform2d: scale, then rotate (degrees, ccw), then move."""
+def transform_2d(
+    scale: tuple[float, ...], rotation: float, translation: tuple[float, ...]
+) -> npt.NDArray[np.float64]:
+    """UsdTransform2d as a (3, 3) column-vector matrix: scale, rotate (degrees, ccw), move."""
     c, s = math.cos(math.radians(rotation)), math.sin(math.radians(rotation))
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    matrix = turn @ np.diag([float(scale[0]), float(scale[1]), 1.0])
-    matrix[:2, 2] = float(translation[0]), float(translation[1])
-    return np.asarray(matrix)
+    matrix = np.asarray(turn @ np.diag([*scale, 1.0]))
+    matrix[:2, 2] = translation
+    return matrix
+
+
+def _primvar(surface: _Node, name: str) -> str:
+    """The primvar that a reader feeds straight into an input; "" where there is none."""
+    source = surface.source(name)
+    if source is None or not str(source.GetIdAttr().Get()).startswith("UsdPrimvarReader_"):
+        return ""
+    return str(_Node(source, surface.time).value("varname", "") or "")
 
 
 def _surface_shader(material: UsdShade.Material) -> UsdShade.Shader | None:
@@ -250,10 +289,18 @@ class _Photometric:
             attribute = prim.GetAttribute(name)
             return attribute.Get(time) if attribute and attribute.HasAuthoredValue() else None
 
-        specular = get("legacy:specularColor")
+        def color(name: str) -> RGB | None:
+            value = get(name)
+            if not isinstance(value, (Gf.Vec3f, Gf.Vec3d, Gf.Vec3h)):
+                return None
+            r, g, b = (float(v) for v in value)
+            return (r, g, b) if min(r, g, b) >= 0.0 and math.isfinite(r + g + b) else None
+
+        self.specular = color("legacy:specularColor")
+        self.diffuse = color("photometric:diffuse")
         shininess = get("legacy:shininess")
-        self.specular = None if specular is None else tuple(float(v) for v in specular)
-        self.shininess = None if shininess is None else float(shininess)
+        usable = isinstance(shininess, float) and 0.0 <= shininess < math.inf
+        self.shininess = min(shininess, _MAX_SHININESS) if usable else None
         self.vertex_color = str(get("photometric:vertexColor") or "")
 
 
@@ -261,8 +308,3 @@ def _wrap(mode: Any) -> str:
     """UsdUVTexture's wrap; useMetadata without metadata is black, as its text says."""
     mode = str(mode)
     return mode if mode in ("repeat", "clamp", "mirror") else "black"
-
-
-def _four(values: Any) -> tuple[float, float, float, float]:
-    a, b, c, d = (float(v) for v in (Gf.Vec4f(*values)))
-    return a, b, c, d

@@ -277,7 +277,7 @@ def test_rows_and_corners_are_limited_over_the_file(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="more than 20 array rows"):
         load(tmp_path, scene(geode(*parts)), limits=Limits(vertices=20))
     many = "DrawArrays GL_QUADS 0 4 \n" * 6
-    with pytest.raises(InputError, match="more than 20 corners"):
+    with pytest.raises(InputError, match="more than 20 corners in all"):
         new(tmp_path, many, limits=Limits(vertices=20))
 
 

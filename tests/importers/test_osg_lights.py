@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from osg_builder import HEADER, group, light_source, load, old_group, scene
 
+from hdrusd.errors import InputError
+from hdrusd.importers.importer import Limits
 from hdrusd.legacy.scene import TRS
 from hdrusd.report import Kind
 
@@ -244,6 +246,15 @@ def test_offset_and_multiplier_of_time(tmp_path: Path) -> None:
     stopped = load(tmp_path, animated(TWO, "TimeMultiplier 0 "))
     assert stopped.root.animation[0].times.tolist() == [1, 3]
     assert stopped.codes() == {"osg-animation"}
+
+
+def test_shared_paths_are_limited(tmp_path: Path) -> None:
+    path = f"AnimationPath TRUE {{\nosg::AnimationPath {{\nUniqueID 5 \n{TWO}\n}}\n}}\n"
+    callback = f"UpdateCallback TRUE {{\nosg::AnimationPathCallback {{\n{path}}}\n}}\n"
+    nodes = [group(kind="osg::MatrixTransform", fields=callback)] * 6
+    assert len(load(tmp_path, scene(*nodes)).root.children) == 6
+    with pytest.raises(InputError, match="more than 10 control points"):
+        load(tmp_path, scene(*nodes), limits=Limits(vertices=10))
 
 
 def test_a_pivot_is_an_inner_node(tmp_path: Path) -> None:

@@ -1,0 +1,1 @@
+"""``python -m tests.bench``: what things cost, as ratios in one run."""
