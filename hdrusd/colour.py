@@ -20,7 +20,7 @@ Array = npt.NDArray[Any]
 #: enough for products of two such numbers in float32.
 BRIGHTEST = 1e12
 
-#: Luminance below which a colour has no chromaticity (human_vision 1.4: never divide by less).
+#: Luminance below which a colour has no chromaticity (never divide by less).
 DARKEST = 1e-9
 
 

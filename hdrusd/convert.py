@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -22,8 +22,8 @@ from hdrusd.photometry.interpret import Interpreter, luminance, rule_color
 from hdrusd.photometry.light import PhotometricLight, chromaticity
 from hdrusd.photometry.sidecar import FILE_NAME, Rule, Sidecar, read_sidecar
 from hdrusd.report import Kind, Report
-from hdrusd.units import TEXTURE_GAMMA
-from hdrusd.usd.material import Map, Surface, write_look, write_photometric
+from hdrusd.surfaces import SurfaceMaker, colored_materials, material_rows
+from hdrusd.usd.material import write_look, write_photometric
 from hdrusd.usd.mesh import COLOR_PRIMVAR
 from hdrusd.usd.settings import Settings
 from hdrusd.usd.writer import Place, StageWriter
@@ -34,6 +34,9 @@ OUTPUT_SUFFIXES = (".usda",)
 
 #: Size of the picture that a stage asks for, pixels.
 _RESOLUTION = (1280, 720)
+
+#: Bytes in the name of a file, as common file systems have it.
+_LONGEST_NAME = 255
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,16 +79,68 @@ class Result:
 def convert(source: Path, output: Path, options: Options, report: Report | None = None) -> Result:
     """Convert one file. Raises InputError, ValidationError; ``output`` is whole or untouched."""
     report = Report() if report is None else report
-    if output.suffix.lower() not in OUTPUT_SUFFIXES:
-        raise InputError(output, f"{output.suffix or 'no suffix'}; want {OUTPUT_SUFFIXES[0]}")
+    _check_output(output)
     if not source.is_file():
         raise InputError(source, "no such file")
-    output.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".hdrusd-", dir=output.parent) as folder:
-        work = _Conversion(source, output, Path(folder), options, report)
-        result = work.run()
-        _move_into_place(Path(folder), output)
+    with _work_folder(output) as folder:
+        result = _Conversion(source, output, folder, options, report).run()
+        _move_into_place(folder, output)
     return result
+
+
+def _check_output(output: Path) -> None:
+    if output.suffix.lower() not in OUTPUT_SUFFIXES:
+        raise InputError(output, f"{output.suffix or 'no suffix'}; want {OUTPUT_SUFFIXES[0]}")
+    if output.is_dir():
+        raise InputError(output, "a folder; want the name of a file")
+    longest = f"{output.stem}.photometry.usda"
+    if len(longest.encode()) > _LONGEST_NAME:
+        raise InputError(output, f"a name of {len(output.name)} characters; want a shorter one")
+    textures = output.parent / f"{output.stem}.textures"
+    if textures.exists() and not output.exists():
+        # It would be replaced, and may well be the source's own.
+        raise InputError(textures, "not of an earlier conversion; want another name for OUTPUT")
+
+
+@contextmanager
+def _work_folder(output: Path) -> Iterator[Path]:
+    """A folder beside ``output`` that is gone in the end, as are parents made for nothing."""
+    above = (output.parent, *output.parent.parents)
+    made = [parent for parent in above if not parent.exists()]
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".hdrusd-", dir=output.parent) as folder:
+            yield Path(folder)
+    finally:
+        for parent in made:
+            with suppress(OSError):  # it is not there, or not empty
+                parent.rmdir()
+
+
+def _move_into_place(folder: Path, output: Path) -> None:
+    """Rename what was made; the root layer last, so that it never names what is not there.
+
+    What stood there before is set aside, and put back when a rename fails.
+    """
+    names = sorted((p.name for p in folder.iterdir()), key=lambda name: name == output.name)
+    old = folder / "replaced"
+    old.mkdir()
+    touched: list[str] = []
+    try:
+        for name in names:
+            touched.append(name)
+            target = output.parent / name
+            if target.exists():
+                target.rename(old / name)
+            (folder / name).rename(target)
+    except BaseException:
+        for name in reversed(touched):
+            target = output.parent / name
+            if not (folder / name).exists() and target.exists():
+                target.rename(folder / name)
+            if (old / name).exists():
+                (old / name).rename(target)
+        raise
 
 
 class _Conversion:
@@ -120,12 +175,16 @@ class _Conversion:
             raise InputError(self.scene.source, "nothing in it that a stage could show")
         self.writer.write_geometry()
         self.interpreter = Interpreter(
-            RULES[self.options.estimate], self.writer.diagonal(), _temperature_rgb, self.report
+            RULES[self.options.estimate],
+            self.writer.diagonal(),
+            self.writer.source_unit,
+            _temperature_rgb,
+            self.report,
         )
         self._write_materials()
         self._write_lights()
         camera = self._write_cameras()
-        self._hide_nodes()
+        self._show_nodes()
         self.writer.write_settings(
             Settings(camera=camera, resolution=_RESOLUTION, operator="reinhard02")
         )
@@ -138,159 +197,51 @@ class _Conversion:
     # -- materials -------------------------------------------------------------------------
 
     def _write_materials(self) -> None:
-        colored = _colored_materials(self.scene)
-        surfaces = [
-            self._surface(index, material, index in colored)
-            for index, material in enumerate(self.scene.materials)
-        ]
+        materials = self.scene.materials
+        colored = colored_materials(self.scene)
+        maker = SurfaceMaker(
+            self.maps, self.interpreter, self.sidecar, self.options.gamma, self.report
+        )
+        surfaces = [maker.surface(m, colored=i in colored) for i, m in enumerate(materials)]
 
         def look(stage: Usd.Stage, index: int, path: Sdf.Path) -> None:
-            material = self.scene.materials[index]
-            used = {
-                role: made
-                for role, texture in (
-                    ("diffuse", material.diffuse_map),
-                    ("emission", material.emission_map),
-                    ("opacity", material.opacity_map),
-                )
-                if texture is not None and (made := self.maps.look(texture)) is not None
-            }
-            if "diffuse" in used:  # the LDR picture is texture times diffuse colour
-                used["diffuse"] = replace(used["diffuse"], scale=material.diffuse)
-            write_look(stage, path, material, used, COLOR_PRIMVAR if index in colored else "")
+            maps = maker.look(materials[index])
+            write_look(
+                stage, path, materials[index], maps, COLOR_PRIMVAR if index in colored else ""
+            )
 
         def photometric(stage: Usd.Stage, index: int, path: Sdf.Path) -> None:
-            write_photometric(stage, path, self.scene.materials[index], surfaces[index])
+            write_photometric(stage, path, materials[index], surfaces[index])
 
         self.writer.edit_materials("look", look)
         self.writer.edit_materials("photometry", photometric)
-
-    def _surface(self, index: int, material: legacy.Material, colored: bool) -> Surface:
-        rule = self.sidecar.match("material", material.name)
-        gamma = self.options.gamma or (rule and rule.number("gamma")) or self.sidecar.gamma
-        gamma = gamma or TEXTURE_GAMMA
-        diffuse = (rule and rule.color("diffuse")) or material.diffuse
-        textured = material.diffuse_map
-        if textured is not None and textured.mode in ("REPLACE", "DECAL"):
-            diffuse = (1.0, 1.0, 1.0)  # the texture covers the material's colour
-        hdr = bool(rule and rule.values.get("hdr_texture"))
-        emission, provenance, name, source = self.interpreter.emission(material, rule)
-        lamp = rule is not None and rule.number("luminance") is not None
-        emission_map = self._emission_map(material, emission, gamma, hdr)
-        reflectance = None
-        if textured is not None and not lamp:
-            reflectance = self.maps.reflectance(
-                textured, diffuse, gamma, material.source, material.name
-            )
-        if reflectance is None:
-            diffuse = self._clip(material, diffuse)
-        self._note_energy(material, diffuse)
-        surface = Surface(
-            diffuse=diffuse,
-            gamma=gamma,
-            diffuse_map=reflectance,
-            source_texture=self._look_file(textured),
-            emission=emission,
-            luminance=luminance(emission),
-            emission_map=emission_map,
-            replaces_reflection=lamp,
-            opacity_map=self._opacity(material),
-            vertex_color=COLOR_PRIMVAR if colored else "",
-            provenance=provenance if luminance(emission) > 0.0 else "",
-            rule=name,
-            source=source,
-        )
-        if colored and reflectance is not None:
-            self.report.add(
-                Kind.REPLACED,
-                "vertex-color",
-                material.source,
-                material.name,
-                "vertex colours times a texture: only hdrusd multiplies both",
-            )
-        self.result.materials.append(
-            {
-                "name": material.name,
-                "path": str(self.writer.materials[index]),
-                "gamma": gamma,
-                "diffuse": list(diffuse),
-                "reflectance_map": reflectance.file if reflectance else None,
-                "luminance_cd_m2": surface.luminance,
-                "provenance": provenance if surface.luminance > 0.0 else None,
-                "rule": name or None,
-            }
-        )
-        return surface
-
-    def _emission_map(
-        self, material: legacy.Material, emission: legacy.RGB, gamma: float, hdr: bool
-    ) -> Map | None:
-        texture = material.emission_map or (material.diffuse_map if hdr else None)
-        if texture is None or luminance(emission) <= 0.0:
-            if hdr:
-                self.report.add(
-                    Kind.MISSING,
-                    "hdr-texture-missing",
-                    material.source,
-                    material.name,
-                    "hdr_texture asked for; the material has no texture or no luminance",
-                )
-            return None
-        return self.maps.luminance(texture, gamma, emission, peak=hdr)
-
-    def _look_file(self, texture: legacy.Texture | None) -> str:
-        made = None if texture is None else self.maps.look(texture)
-        return made.file if made else ""
-
-    def _opacity(self, material: legacy.Material) -> Map | None:
-        """Opacity stays as it was: the look's own file, read raw."""
-        if material.opacity_map is None or material.alpha_mode == "opaque":
-            return None
-        made = self.maps.look(material.opacity_map)
-        return replace(made, raw=True) if made else None
-
-    def _clip(self, material: legacy.Material, diffuse: legacy.RGB) -> legacy.RGB:
-        if max(diffuse) > 1.0 or min(diffuse) < 0.0:
-            self.report.add(
-                Kind.CLAMPED,
-                "diffuse-clipped",
-                material.source,
-                material.name,
-                f"diffuse {tuple(round(c, 4) for c in diffuse)}; clipped to [0, 1]",
-            )
-            r, g, b = (min(max(c, 0.0), 1.0) for c in diffuse)
-            return r, g, b
-        return diffuse
-
-    def _note_energy(self, material: legacy.Material, diffuse: legacy.RGB) -> None:
-        total = max(d + s for d, s in zip(diffuse, material.specular, strict=True))
-        if material.pbr is None and total > 1.0 + 1e-6:
-            self.report.add(
-                Kind.ASSUMED,
-                "energy",
-                material.source,
-                material.name,
-                f"diffuse and specular add up to {total:.3g}; more than falls in",
-            )
+        self.result.materials = material_rows(materials, self.writer.materials, surfaces)
 
     # -- lights ----------------------------------------------------------------------------
 
     def _write_lights(self) -> None:
         ambients: list[PhotometricLight] = []
-        interpreted: dict[int, list[tuple[Place, PhotometricLight]]] = {}
+        interpreted: list[tuple[Place, int, PhotometricLight]] = []
         for place in self.writer.places:
             for index in place.node.lights:
                 light = self.scene.lights[index]
                 rule = self.sidecar.match("light", light.name, place.node.name)
-                meaning = self.interpreter.light(light, rule)
-                if meaning is None:
+                if light.kind == "ambient" and self.sidecar.ambient is not None:
+                    text = f"{self.sidecar.ambient.place} says the sky; not added to it"
+                    self.report.add(
+                        Kind.REPLACED, "ambient-replaced", light.source, light.name, text
+                    )
                     continue
-                if meaning.kind == "ambient":
+                meaning = self.interpreter.light(light, rule)
+                if meaning is not None and meaning.kind == "ambient":
                     ambients.append(meaning)
-                else:
-                    interpreted.setdefault(index, []).append((place, meaning))
-        for index, place, light, prim in self.writer.write_lights(interpreted):
-            self._account(str(prim.GetPath()), self.scene.lights[index], place, light)
+                elif meaning is not None:
+                    interpreted.append((place, index, meaning))
+        for place, index, lamp in interpreted:
+            source = self.scene.lights[index]
+            prim = self.writer.write_light(place, source, lamp)
+            row = _light_row(source.name, str(prim.GetPath()), lamp, source, str(place.node.source))
+            self.result.lights.append(row)
         ambient = self._ambient(ambients)
         if ambient is not None:
             path = self.writer.write_ambient(ambient).GetPath()
@@ -299,13 +250,11 @@ class _Conversion:
     def _ambient(self, from_lights: list[PhotometricLight]) -> PhotometricLight | None:
         """The photometry file's sky, else the sum of what the source calls ambient."""
         rule = self.sidecar.ambient
-        lux = rule.number("illuminance") if rule else None
-        if rule is not None and lux is not None:
-            color = rule_color(rule, _temperature_rgb) or (1.0, 1.0, 1.0)
+        if rule is not None:
             return PhotometricLight(
                 "ambient",
-                lux,
-                color,
+                rule.number("illuminance") or 0.0,
+                rule_color(rule, _temperature_rgb) or (1.0, 1.0, 1.0),
                 provenance=rule.provenance,
                 rule=str(rule.place),
                 source=rule.source,
@@ -332,13 +281,6 @@ class _Conversion:
         color, strength = chromaticity((r, g, b))
         return replace(from_lights[0], intensity=strength, chromaticity=color)
 
-    def _account(
-        self, path: str, source: legacy.Light, place: Place, light: PhotometricLight
-    ) -> None:
-        self.result.lights.append(
-            _light_row(source.name, path, light, source, str(place.node.source))
-        )
-
     # -- cameras, nodes, checks ------------------------------------------------------------
 
     def _write_cameras(self) -> str | None:
@@ -346,25 +288,16 @@ class _Conversion:
         first: str | None = None
         for place in self.writer.places:
             rule = self.sidecar.match("camera", place.node.name)
-            if rule is None:
-                for index in place.node.cameras:
-                    name = self.scene.cameras[index].name
-                    first = first or self._camera_path(place, name)
-                continue
-            camera = _node_camera(place, rule)
-            first = first or str(self.writer.write_node_camera(place, camera))
-        return first
+            if rule is not None:
+                camera = _node_camera(place, rule)
+                first = first or str(self.writer.write_node_camera(place, camera))
+        return first or self.writer.first_camera
 
-    def _camera_path(self, place: Place, name: str) -> str | None:
-        prim = self.writer.stage.GetPrimAtPath(place.path)
-        cameras = [p for p in prim.GetChildren() if p.GetTypeName() == "Camera"]
-        return str(cameras[0].GetPath()) if cameras else None
-
-    def _hide_nodes(self) -> None:
+    def _show_nodes(self) -> None:
         for place in self.writer.places:
             rule = self.sidecar.match("node", place.node.name)
-            if rule is not None and rule.values.get("visible") is False:
-                self.writer.hide(place)
+            if rule is not None and "visible" in rule.values:
+                self.writer.set_visible(place, visible=rule.values["visible"])
 
     def _validate(self) -> None:
         stage = Usd.Stage.Open(str(self.folder / self.output.name))
@@ -383,17 +316,6 @@ def _find_sidecar(source: Path, options: Options, report: Report) -> Sidecar:
     if options.photometry is None and not path.is_file():
         return Sidecar()
     return read_sidecar(path, report)
-
-
-def _colored_materials(scene: legacy.LegacyScene) -> set[int]:
-    """Materials worn by a mesh with vertex colours that are not all white."""
-    colored: set[int] = set()
-    for mesh in scene.meshes:
-        if mesh.colors is not None and not bool((mesh.colors[:, :3] == 1.0).all()):
-            colored.update(subset.material for subset in mesh.subsets)
-            if mesh.material is not None:
-                colored.add(mesh.material)
-    return colored
 
 
 def _node_camera(place: Place, rule: Rule) -> legacy.Camera:
@@ -436,13 +358,3 @@ def _light_row(
         "source_value": legacy_value,
         "flux_lm": light.intensity * 4.0 * math.pi if light.kind == "point" else None,
     }
-
-
-def _move_into_place(folder: Path, output: Path) -> None:
-    """Rename what was made; the root layer last, so that it never names what is not there."""
-    names = sorted(folder.iterdir(), key=lambda path: path.name == output.name)
-    for path in names:
-        target = output.parent / path.name
-        if path.is_dir() and target.is_dir():
-            shutil.rmtree(target)
-        path.replace(target)

@@ -53,7 +53,8 @@ def _parse_range(part: str, spec: str) -> Iterator[Decimal]:
         ) from None
     if not (first.is_finite() and last.is_finite() and stride.is_finite()):
         raise FrameError(f"--frames: {part}: want finite numbers")
-    if max(abs(first), abs(last)) > MAX_TIME or 0 < abs(stride) < 1 / MAX_TIME:
+    # copy_abs: abs() rounds to the context, which overflows.
+    if max(first.copy_abs(), last.copy_abs()) > MAX_TIME or 0 < stride.copy_abs() < 1 / MAX_TIME:
         raise FrameError(f"--frames: {part}: want frames to {MAX_TIME:g}, strides from 1e-9")
     if by and (not colon or stride == 0 or (stride < 0 and last >= first)):
         raise FrameError(f"--frames: {part}: want a stride that leads from first to last")

@@ -31,6 +31,9 @@ MAX_PIXELS = 16384 * 16384
 #: Nor beyond this many a byte of the file: no codec packs that tight.
 _PIXELS_A_BYTE = 10_000
 
+#: The last chunk's name and checksum (PNG, ISO/IEC 15948, 11.2.5).
+_PNG_END = b"IEND\xaeB`\x82"
+
 #: The largest finite half float.
 HALF_MAX = 65504.0
 
@@ -189,7 +192,10 @@ def write_png(path: Path, pixels: npt.NDArray[np.uint8], comment: str = "") -> N
         if out is None or not out.open(str(temporary), spec):
             raise RuntimeError(out.geterror() if out else oiio.geterror())
         whole = out.write_image(np.ascontiguousarray(pixels))
-        if not out.close() or not whole:  # the last bytes are only written now
+        if not out.close() or not whole:
             raise RuntimeError(out.geterror())
+        # OpenImageIO 3.2 says nothing when the disk is full.
+        if not temporary.read_bytes().endswith(_PNG_END):
+            raise RuntimeError("it is not whole; is the disk full?")
 
     write_atomically(path, write)

@@ -26,6 +26,7 @@ LAYERS = (
     {"importers", "images"},
     {"usd", "gpu"},
     {"display", "maps", "validation"},
+    {"surfaces"},
     {"convert", "render"},
     {"testing"},
     {"cli"},

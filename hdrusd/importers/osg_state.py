@@ -150,6 +150,8 @@ class StateReader:
             units = listed.block.statements if listed is not None and listed.block else []
             for unit, statement in enumerate(units[:_UNITS]):
                 yield from read(statement, unit)
+            for statement in units[_UNITS : _UNITS + 1]:
+                self._dropped(statement, f"units from {_UNITS} on")
         for key in ("uniformlist", "definelist", "updatecallback", "eventcallback"):
             found = document.field(place, key)
             if found is not None and found.block is not None:
@@ -177,9 +179,11 @@ class StateReader:
         for statement in place.block.statements if place.block is not None else []:
             if statement.key == "textureunit" and len(statement.words) > 1:
                 unit = statement.declared
-                inner = statement.block.statements if statement.block is not None else []
-                for item in inner if unit is not None and unit < _UNITS else []:
-                    yield from self._old_statement(item, unit or 0)
+                if unit is None or unit >= _UNITS:
+                    self._dropped(statement, " ".join(statement.words[:2]))
+                    continue
+                for item in statement.block.statements if statement.block is not None else []:
+                    yield from self._old_statement(item, unit)
             else:
                 yield from self._old_statement(statement, NO_UNIT)
 
@@ -197,9 +201,9 @@ class StateReader:
     def _mode(
         self, place: Statement, name: str, value: str, unit: int
     ) -> Iterator[tuple[Key, Setting]]:
-        if value == "INHERIT":
+        flags = value.replace("_", "|").split("|")  # .osg knows OVERRIDE_ON too
+        if "INHERIT" in flags:
             return
-        flags = value.replace("_", "|").split("|")
         on = "ON" in flags
         if name not in _KNOWN_MODES:
             if on:
@@ -214,6 +218,8 @@ class StateReader:
             self._dropped(place, name)
             return
         parts = flags.split("|")
+        if "INHERIT" in parts:
+            return
         yield (unit, kind), Setting(place, True, "OVERRIDE" in parts, "PROTECTED" in parts)
 
     def _dropped(self, place: Statement, what: str) -> None:

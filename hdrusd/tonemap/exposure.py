@@ -1,7 +1,7 @@
 """A photometric camera: EV at ISO 100, saturation-based exposure, clipping at white.
 
-ISO 12232 (saturation-based speed, q = 0.65) and ISO 2720 (meters: K = 12.5, C = 250);
-human_vision 4.6. Twin of exposure.glsl.
+ISO 12232 (saturation-based speed, q = 0.65) and ISO 2720 (meters: K = 12.5, C = 250).
+Twin of exposure.glsl.
 """
 
 from __future__ import annotations

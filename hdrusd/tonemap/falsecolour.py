@@ -1,6 +1,6 @@
 """False colour: luminance on a logarithmic scale from blue to red, to check a scene.
 
-The scale and the palette of Radiance's falsecolor ("spec"; human_vision 4.10). The
+The scale and the palette of Radiance's falsecolor ("spec"). The
 legend is in legend.py. Twin of falsecolour.glsl.
 """
 

@@ -21,7 +21,7 @@ Array = npt.NDArray[Any]
 Value = float | str | None
 Parameters = Mapping[str, Value]
 
-#: cd/m2 that a pixel must exceed to be counted (human_vision 1.6): the logarithm of a
+#: cd/m2 that a pixel must exceed to be counted: the logarithm of a
 #: black pixel would decide the average of the whole frame.
 FLOOR = 1e-5
 

@@ -29,7 +29,7 @@ from hdrusd.tonemap.operator import (
 
 
 def reinhard02(rgb: npt.ArrayLike, scale: float, inverse_white2: float) -> Array:
-    """cd/m2 (..., 3) to display-linear [0, 1], chromaticity kept (human_vision 1.1, 1.4).
+    """cd/m2 (..., 3) to display-linear [0, 1], chromaticity kept (eq. 4).
 
     ``scale`` is key / log average in 1/(cd/m2); ``inverse_white2`` is 1 / white^2,
     white being the smallest scaled luminance that becomes 1.

@@ -111,7 +111,7 @@ def conform_aperture(
     return (width, width / aspect) if fit_width else (height * aspect, height)
 
 
-def framing_camera(low: np.ndarray, high: np.ndarray, up: str, aspect: float) -> Camera:  # type: ignore[type-arg]
+def framing_camera(low: np.ndarray, high: np.ndarray, up: str, aspect: float) -> Camera:
     """A camera that sees a whole box (m), for stages without one, as usdrecord makes one.
 
     60 degrees wide or high, whichever is less, from the front and somewhat above.
@@ -146,6 +146,6 @@ def _exposure_scale(camera: UsdGeom.Camera, time: Usd.TimeCode) -> float | None:
     return float(camera.ComputeLinearExposureScale(time))
 
 
-def _vec(values: np.ndarray) -> tuple[float, float, float]:  # type: ignore[type-arg]
+def _vec(values: np.ndarray) -> tuple[float, float, float]:
     x, y, z = (float(v) for v in values)
     return x, y, z

@@ -7,7 +7,10 @@ and our schema. Muting either leaves the other whole.
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
@@ -33,6 +36,7 @@ class Surface:
 
     diffuse: RGB  # D
     gamma: float
+    specular: RGB = (0.0, 0.0, 0.0)
     diffuse_map: Map | None = None  # reflectance map, R = T^gamma D
     source_texture: str = ""
     emission: RGB = (0.0, 0.0, 0.0)  # cd/m2, at 1.0 of its map
@@ -53,7 +57,8 @@ def write_look(
     network = _Network(stage, path, "Look")
     network.color("diffuseColor", material.diffuse, maps.get("diffuse"), vertex_color)
     network.color("emissiveColor", _shown(material), maps.get("emission"), "")
-    _write_common(network, material, maps.get("opacity"))
+    keep_extras(network.material.GetPrim(), material.extras)
+    _write_common(network, material, material.specular, maps.get("opacity"))
 
 
 def write_photometric(
@@ -67,7 +72,9 @@ def write_photometric(
     else:
         network.color("diffuseColor", surface.diffuse, surface.diffuse_map, surface.vertex_color)
     network.color("emissiveColor", surface.emission, surface.emission_map, "")
-    _write_common(network, material, surface.opacity_map, dark=surface.replaces_reflection)
+    specular = black if surface.replaces_reflection else surface.specular
+    dark = surface.replaces_reflection
+    _write_common(network, material, specular, surface.opacity_map, dark=dark)
     prim = network.material.GetPrim()
     prim.ApplyAPI(_API)
     types = Sdf.ValueTypeNames
@@ -90,7 +97,6 @@ def write_photometric(
     if surface.source:
         _set(prim, "photometric:source", types.String, surface.source)
     if material.pbr is None:
-        specular = black if surface.replaces_reflection else material.specular
         _set(prim, "legacy:specularColor", types.Color3f, Gf.Vec3f(*specular))
         _set(prim, "legacy:shininess", types.Float, material.shininess)
     _set(prim, "legacy:ambient", types.Color3f, Gf.Vec3f(*material.ambient))
@@ -107,19 +113,22 @@ def _shown(material: Material) -> RGB:
 
 
 def _write_common(
-    network: _Network, material: Material, opacity: Map | None, *, dark: bool = False
+    network: _Network, material: Material, specular: RGB, opacity: Map | None, *, dark: bool = False
 ) -> None:
     """Gloss and opacity, which both surfaces share; a dark one reflects nothing at all."""
-    pbr = material.pbr
-    if pbr is None or dark:
+    pbr = material.pbr or {}
+    roughness = pbr.get("roughness", roughness_from_shininess(material.shininess))
+    if "glossiness" in pbr:
+        roughness = 1.0 - pbr["glossiness"]
+    if dark or material.pbr is None or "glossiness" in pbr:
         network.number("useSpecularWorkflow", 1, Sdf.ValueTypeNames.Int)
-        specular = (0.0, 0.0, 0.0) if dark else material.specular
         network.color("specularColor", specular, None, "")
-        network.number("roughness", roughness_from_shininess(material.shininess))
     else:
-        network.number("metallic", float(pbr.get("metallic", 0.0)))
-        network.number("roughness", float(pbr.get("roughness", 0.5)))
-    if material.alpha_mode == "opaque":
+        network.number("metallic", pbr.get("metallic", 0.0))
+    network.number("roughness", roughness)
+    if material.alpha_mode == "opaque" or (
+        material.alpha_mode == "mask" and material.alpha_cutoff <= 0.0  # which nothing is below
+    ):
         return
     if opacity is not None:
         network.scalar("opacity", opacity, material.alpha)
@@ -206,6 +215,12 @@ class _Network:
 
 def _set(prim: Usd.Prim, name: str, kind: Sdf.ValueTypeName, value: object) -> None:
     prim.CreateAttribute(name, kind, False, Sdf.VariabilityUniform).Set(value)
+
+
+def keep_extras(prim: Usd.Prim, extras: Mapping[str, Any]) -> None:
+    """What a source says beyond its format, as JSON in the prim's metadata."""
+    if extras:
+        prim.SetCustomDataByKey("hdrusd:extras", json.dumps(dict(extras), default=str))
 
 
 def bind(prim: Usd.Prim, material: Sdf.Path) -> None:

@@ -113,7 +113,7 @@ class GeometryReader:
             solid = np.ones(self.faces, np.bool_)
             solid[index[(index >= 0) & (index < self.faces)]] = False
             tri = tri.select(solid)
-        finite = np.isfinite(self.points).all(axis=1)
+        finite: npt.NDArray[np.bool_] = np.asarray(np.isfinite(self.points).all(axis=1))
         if not finite.all():
             self._finding(
                 Kind.INVALID, "mesh-not-finite", "points are not finite; their faces left"

@@ -21,7 +21,7 @@ from hdrusd.photometry.light import PhotometricLight
 from hdrusd.report import Report
 from hdrusd.usd.camera import write_camera
 from hdrusd.usd.light import write_legacy_falloff, write_light
-from hdrusd.usd.material import bind, bind_faces
+from hdrusd.usd.material import bind, bind_faces, keep_extras
 from hdrusd.usd.mesh import write_mesh
 from hdrusd.usd.settings import Settings, write_settings
 from hdrusd.usd.transform import aim, rigid, uniform_scale, write_transform
@@ -30,6 +30,8 @@ from hdrusd.usd.transform import aim, rigid, uniform_scale, write_transform
 CODES_PER_SECOND = 24.0
 
 LAYERS = ("photometry", "look", "geometry")
+
+_PROTOTYPES = Sdf.Path("/__Prototypes")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,11 +79,14 @@ class StageWriter:
     ) -> None:
         self.scene = scene
         self.report = report
+        self.source_unit = source_unit
         self.unit = source_unit / meters_per_unit  # scene units a source unit
         self.meters_per_unit = meters_per_unit
-        self.names = Names()
+        top = Sdf.Path.absoluteRootPath
+        self.names = Names({top: {"Render", _PROTOTYPES.name}})
         self.places: list[Place] = []
         self.end: float | None = None
+        self.first_camera: str | None = None
         root = Sdf.Layer.CreateNew(str(folder / f"{stem}.usda"))
         self.layers = {
             name: Sdf.Layer.CreateNew(
@@ -93,7 +98,9 @@ class StageWriter:
         self.stage = Usd.Stage.Open(root)
         UsdGeom.SetStageMetersPerUnit(self.stage, meters_per_unit)
         UsdGeom.SetStageUpAxis(self.stage, up)
-        self.root = Sdf.Path("/").AppendChild(Tf.MakeValidIdentifier(stem))
+        if scene.generator:
+            root.comment = f"made from {scene.source.name}, {scene.generator[:200]}"
+        self.root = self.names.child(top, stem)
         self.looks = self.names.child(self.root, "Looks")
         self.materials = [self.names.child(self.looks, m.name) for m in scene.materials]
         self._prototypes: dict[int, Sdf.Path] = {}
@@ -108,12 +115,13 @@ class StageWriter:
             root.AddScaleOp(UsdGeom.XformOp.PrecisionDouble).Set(Gf.Vec3d(self.unit))
         UsdGeom.Scope.Define(self.stage, self.looks)
         uses = self._mesh_uses()
-        stack = [(node, self.root) for node in reversed(self.scene.roots)]
+        stack = [(node, self.root, True) for node in reversed(self.scene.roots)]
         while stack:
-            node, parent = stack.pop()
+            node, parent, shown = stack.pop()
             path = self.names.child(parent, node.name)
-            self._write_node(node, path, uses)
-            stack.extend((child, path) for child in reversed(node.children))
+            self._write_node(node, path, uses, visible=shown and node.visible)
+            below = zip(node.children, self._shown_children(node), strict=True)
+            stack.extend((child, path, on) for child, on in reversed(list(below)))
         self._edit(None)
         prim = self.stage.GetPrimAtPath(self.root)
         self.stage.SetDefaultPrim(prim)
@@ -135,9 +143,12 @@ class StageWriter:
                 uses[mesh] = uses.get(mesh, 0) + 1
         return uses
 
-    def _write_node(self, node: legacy.Node, path: Sdf.Path, uses: dict[int, int]) -> None:
+    def _write_node(
+        self, node: legacy.Node, path: Sdf.Path, uses: dict[int, int], *, visible: bool
+    ) -> None:
         prim = UsdGeom.Xform.Define(self.stage, path)
         self._display_name(prim.GetPrim(), node.name)
+        keep_extras(prim.GetPrim(), node.extras)
         end = write_transform(prim, node, CODES_PER_SECOND)
         if end is not None:
             self.end = max(end, self.end or 0.0)
@@ -145,7 +156,7 @@ class StageWriter:
             self._finding(
                 findings.Kind.REPLACED, "animation-loop", node, "looping animation is played once"
             )
-        if not node.visible:
+        if not visible:
             prim.CreateVisibilityAttr(UsdGeom.Tokens.invisible)
         self.places.append(Place(node, path))
         for index in node.meshes:
@@ -159,28 +170,24 @@ class StageWriter:
             camera = self.scene.cameras[index]
             child = self.names.child(path, camera.name)
             write_camera(self.stage, child, camera, unit=self.unit)
-        self._hide_children(node, path)
+            self.first_camera = self.first_camera or str(child)
 
-    def _hide_children(self, node: legacy.Node, path: Sdf.Path) -> None:
+    def _shown_children(self, node: legacy.Node) -> list[bool]:
         """Of levels of detail the finest stays visible, of switches what is on."""
-        hidden: list[int] = []
+        count = len(node.children)
         if node.kind == "lod" and len(node.lod_ranges) > 1:
-            nearest = min(range(len(node.lod_ranges)), key=lambda i: node.lod_ranges[i])
-            hidden = [i for i in range(len(node.children)) if i != nearest]
-            self._finding(
-                findings.Kind.REPLACED,
-                "lod",
-                node,
-                f"{len(node.children)} levels of detail; the nearest is shown at all distances",
-            )
+            text = f"{count} levels of detail; the nearest is shown at all distances"
+            self._finding(findings.Kind.REPLACED, "lod", node, text)
+            real = [low for low, high in node.lod_ranges if high > low]
+            nearest = min(real, default=0.0)
+            shown = [low == nearest and high > low for low, high in node.lod_ranges]
         elif node.kind == "switch":
-            on = node.switch_on
-            hidden = [i for i in range(len(node.children)) if i < len(on) and not on[i]]
+            shown = list(node.switch_on)
         elif node.kind == "sequence":
-            hidden = list(range(1, len(node.children)))
-        # Children are written after their parent; names are given in the same order.
-        for index in hidden:
-            node.children[index].visible = False
+            return [index == 0 for index in range(count)]
+        else:
+            shown = []
+        return [*shown, *[node.kind != "lod" or not shown] * count][:count]
 
     def _mesh(self, path: Sdf.Path, mesh: legacy.Mesh) -> None:
         prim = write_mesh(self.stage, path, mesh)
@@ -196,8 +203,8 @@ class StageWriter:
     def _instance(self, path: Sdf.Path, index: int) -> None:
         if index not in self._prototypes:
             mesh = self.scene.meshes[index]
-            holder = self.names.child(Sdf.Path("/__Prototypes"), mesh.name)
-            self.stage.CreateClassPrim("/__Prototypes")
+            holder = self.names.child(_PROTOTYPES, mesh.name)
+            self.stage.CreateClassPrim(_PROTOTYPES)
             UsdGeom.Xform.Define(self.stage, holder)
             self._mesh(holder.AppendChild("Mesh"), mesh)
             self._prototypes[index] = holder
@@ -212,11 +219,12 @@ class StageWriter:
         write_camera(self.stage, path, camera, unit=self.unit)
         return path
 
-    def hide(self, place: Place) -> None:
-        """Switch a node off in the photometry layer."""
+    def set_visible(self, place: Place, *, visible: bool) -> None:
+        """Switch a node on or off in the photometry layer."""
         self._edit("photometry")
         prim = UsdGeom.Imageable(self.stage.GetPrimAtPath(place.path))
-        prim.CreateVisibilityAttr(UsdGeom.Tokens.invisible)
+        token = UsdGeom.Tokens.inherited if visible else UsdGeom.Tokens.invisible
+        prim.CreateVisibilityAttr(token)
 
     # -- looks and photometry --------------------------------------------------------------
 
@@ -230,38 +238,31 @@ class StageWriter:
             spec.specifier = Sdf.SpecifierDef
             spec.typeName = "Material"
 
-    def write_lights(
-        self, interpreted: dict[int, list[tuple[Place, PhotometricLight]]]
-    ) -> list[tuple[int, Place, PhotometricLight, Usd.Prim]]:
-        """Lights at their nodes, by index into the scene's table, into the photometry layer."""
+    def write_light(self, place: Place, source: legacy.Light, light: PhotometricLight) -> Usd.Prim:
+        """A light at its node, into the photometry layer."""
         self._edit("photometry")
-        cache = UsdGeom.XformCache()
-        written = []
-        for index, uses in interpreted.items():
-            source = self.scene.lights[index]
-            for place, light in uses:
-                path = self.names.child(place.path, source.name)
-                world = cache.GetLocalToWorldTransform(self.stage.GetPrimAtPath(place.path))
-                scale, even = uniform_scale(world)
-                if not even:
-                    scale = 1.0
-                prim = write_light(
-                    self.stage, path, light, scale=max(scale, 1e-12) * self.meters_per_unit
-                )
-                self._display_name(prim, source.name)
-                self._place_light(prim, source, world, even)
-                write_legacy_falloff(prim, source.range, source.attenuation)
-                prim.SetCustomDataByKey(
-                    "hdrusd:legacy",
-                    {
-                        "diffuse": Gf.Vec3d(*source.diffuse),
-                        "specular": Gf.Vec3d(*source.specular),
-                        "ambient": Gf.Vec3d(*source.ambient),
-                        "spotExponent": float(source.spot_exponent),
-                    },
-                )
-                written.append((index, place, light, prim))
-        return written
+        path = self.names.child(place.path, source.name)
+        node = UsdGeom.Xformable(self.stage.GetPrimAtPath(place.path))
+        # What is animated has no value at the default time.
+        world = node.ComputeLocalToWorldTransform(Usd.TimeCode.EarliestTime())
+        scale, even = uniform_scale(world)
+        if not even:
+            scale = 1.0
+        prim = write_light(self.stage, path, light, scale=scale * self.meters_per_unit)
+        self._display_name(prim, source.name)
+        self._place_light(prim, source, world, even)
+        write_legacy_falloff(prim, source.range, source.attenuation)
+        keep_extras(prim, source.extras)
+        prim.SetCustomDataByKey(
+            "hdrusd:legacy",
+            {
+                "diffuse": Gf.Vec3d(*source.diffuse),
+                "specular": Gf.Vec3d(*source.specular),
+                "ambient": Gf.Vec3d(*source.ambient),
+                "spotExponent": float(source.spot_exponent),
+            },
+        )
+        return prim
 
     def _place_light(
         self, prim: Usd.Prim, source: legacy.Light, world: Gf.Matrix4d, even: bool
@@ -308,17 +309,19 @@ class StageWriter:
 
     def diagonal(self) -> float:
         """Of the whole scene, m."""
-        cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_])
+        cache = UsdGeom.BBoxCache(Usd.TimeCode.EarliestTime(), [UsdGeom.Tokens.default_])
         box = cache.ComputeWorldBound(self.stage.GetPseudoRoot()).ComputeAlignedRange()
         return 0.0 if box.IsEmpty() else float(box.GetSize().GetLength()) * self.meters_per_unit
 
-    def save(self) -> list[Path]:
-        """Write all layers; the root, by which the rest is found, comes last."""
-        for layer in self.layers.values():
-            layer.Save()
-        root = self.stage.GetRootLayer()
-        root.Save()
-        return [Path(layer.identifier) for layer in (*self.layers.values(), root)]
+    def save(self) -> None:
+        """Write all layers; the root, by which the rest is found, comes last. Raises OSError."""
+        for layer in (*self.layers.values(), self.stage.GetRootLayer()):
+            try:
+                saved = layer.Save()
+            except Tf.ErrorException as problem:
+                raise OSError(f"{layer.identifier}: {problem}") from problem
+            if not saved:
+                raise OSError(f"{layer.identifier}: cannot be written")
 
     def _edit(self, layer: str | None) -> None:
         target = self.stage.GetRootLayer() if layer is None else self.layers[layer]

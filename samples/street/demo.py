@@ -61,12 +61,19 @@ def read_png(path: Path) -> np.ndarray:
     return np.asarray(oiio.ImageBuf(str(path)).get_pixels(oiio.UINT8))[..., :3]
 
 
+def halve(picture: np.ndarray) -> np.ndarray:
+    """Half the size, each pixel the mean of four."""
+    h, w = picture.shape[0] // 2, picture.shape[1] // 2
+    blocks = picture[: 2 * h, : 2 * w].reshape(h, 2, w, 2, 3)
+    return (blocks.mean(axis=(1, 3)) + 0.5).astype(np.uint8)
+
+
 def write_sheet(out: Path, columns: list[str]) -> Path:
     """Rows of moments, columns of looks, at half size."""
     rows = []
     for frame in ROWS:
-        tiles = [read_png(out / "frames" / f"{c}.{frame:04d}.png")[::2, ::2] for c in columns]
-        rows.append(np.concatenate(tiles, axis=1))
+        pictures = [read_png(out / "frames" / f"{c}.{frame:04d}.png") for c in columns]
+        rows.append(np.concatenate([halve(picture) for picture in pictures], axis=1))
     sheet = np.ascontiguousarray(np.concatenate(rows, axis=0))
     path = out / "contact_sheet.png"
     spec = oiio.ImageSpec(sheet.shape[1], sheet.shape[0], 3, oiio.UINT8)
@@ -94,10 +101,11 @@ def main() -> None:
     run(HDRUSD, "tonemap", night, frames / "exposure.####.png", "--frames", rows,
         "--operator", "exposure")  # fmt: skip
     run(HDRUSD, "tonemap", night, frames / "falsecolour.####.png", "--frames", rows,
-        "--operator", "falsecolour")  # fmt: skip
+        "--operator", "falsecolour", "--set", "scale=1000", "--set", "decades=4")  # fmt: skip
     day = write_daylight(out)
     run(HDRUSD, "render", day, frames / "daylight.####.png", "--frames", rows,
-        "--camera", "Camera", "--operator", "exposure", *width)  # fmt: skip
+        "--camera", "Camera", "--operator", "exposure", "--enableDomeLightVisibility",
+        *width)  # fmt: skip
     sheet = write_sheet(out, ["daylight", "exposure", "reinhard", "falsecolour"])
     print(f"{sheet}: daylight | exposure | Reinhard | false colour")
     print(f"{frames}: 24 frames in cd/m2 and tone-mapped; {time.perf_counter() - started:.0f} s")

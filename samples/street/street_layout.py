@@ -196,10 +196,10 @@ def _traffic() -> list[Node]:
 def _views() -> list[Node]:
     """The cameras that stand still."""
     overview = turn("x", 88.0)
-    arcade = compose(turn("z", -7.0), turn("x", 90.0))
+    arcade = compose(turn("z", -4.0), turn("x", 91.0))
     return [
         Node("Overview", "matrix", (0.8, 3.0, 6.0), overview, camera=Camera(50.0)),
-        Node("ArcadeWalk", "matrix", (-12.2, 1.5, 1.75), arcade, camera=Camera(60.0)),
+        Node("ArcadeWalk", "matrix", (-11.2, 2.0, 1.75), arcade, camera=Camera(60.0)),
     ]
 
 

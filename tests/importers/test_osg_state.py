@@ -37,6 +37,7 @@ COLOURED = array("Color", "Vec4Array", "0.25 0.5 0.75 0.5", "BIND_OVERALL")
         ("", "", (0.8, 0.8, 0.8)),
         (RED, "", (1, 0, 0)),
         (RED, GREEN, (0, 1, 0)),
+        (RED, GREEN.replace("OFF", "INHERIT"), (1, 0, 0)),
         (RED.replace("OFF", "OVERRIDE"), GREEN, (1, 0, 0)),
         (RED.replace("OFF", "OVERRIDE"), GREEN.replace("OFF", "PROTECTED"), (0, 1, 0)),
         (RED.replace("OFF", "OVERRIDE"), GREEN.replace("OFF", "OVERRIDE|PROTECTED"), (0, 1, 0)),
@@ -55,6 +56,7 @@ def test_a_child_replaces_what_is_not_overridden(
     [
         ("ON", "OFF", False),
         ("OFF", "INHERIT", False),
+        ("ON", "INHERIT", True),
         ("OFF", "ON", True),
         ("OVERRIDE|OFF", "ON", False),
         ("OVERRIDE_OFF", "ON", False),
@@ -91,6 +93,17 @@ def test_state_without_a_home_is_said(tmp_path: Path) -> None:
     assert things == {"Fog", "Program", "GL_FOG"}
     old = old_dressed(tmp_path, "GL_FOG ON\nUniform {\nuName f\n}\nPoint {\nsize 2\n}")
     assert {f.thing for f in old.report if f.code == "osg-state"} == {"GL_FOG", "Uniform", "Point"}
+
+
+def test_units_that_opengl_has_not_are_said(tmp_path: Path) -> None:
+    (tmp_path / "a.png").touch()
+    made = old_dressed(
+        tmp_path, "textureUnit 32 {\nGL_TEXTURE_2D ON\nTexture2D {\nfile a.png\n}\n}"
+    )
+    assert (made.material.diffuse_map, made.codes()) == (None, {"osg-state"})
+    made = dressed(tmp_path, state_set(unit=texture(named("a.png")), units=33))
+    assert made.material.diffuse_map is not None
+    assert [f.thing for f in made.report if f.code == "osg-state"] == ["units from 32 on"] * 2
 
 
 # --- materials ----------------------------------------------------------------------------
