@@ -290,7 +290,8 @@ class _Conversion:
             rule = self.sidecar.match("camera", place.node.name)
             if rule is not None:
                 camera = _node_camera(place, rule)
-                first = first or str(self.writer.write_node_camera(place, camera))
+                path = str(self.writer.write_node_camera(place, camera))
+                first = first or path
         return first or self.writer.first_camera
 
     def _show_nodes(self) -> None:

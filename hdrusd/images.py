@@ -70,7 +70,7 @@ def _decode(real: Path, named: Path) -> ImageData:
         if pixels is None:
             raise InputError(named, f"broken image ({_first_line(picture.geterror())})")
         array = np.asarray(pixels).reshape(spec.height, spec.width, channels)
-        return ImageData(array, named)
+        return ImageData(array, named, integers="int" in str(spec.format))
     finally:
         picture.close()
 

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections import OrderedDict
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +32,18 @@ _PORTABLE = {".png", ".jpg", ".jpeg", ".exr"}
 #: Above this a half float has no value.
 _HALF_MAX = 65504.0
 
+#: Bytes of decoded pictures that are kept for the next material.
+_KEPT = 512 << 20
+
 Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class _Picture:
+    """Decoded pixels, (h, w, channels), and whether they are integer codes in the file."""
+
+    pixels: npt.NDArray[np.generic]
+    integers: bool
 
 
 class MapWriter:
@@ -41,7 +54,7 @@ class MapWriter:
         self.prefix = prefix
         self.report = report
         self.written: dict[str, dict[str, object]] = {}  # file -> what it is, for the report
-        self._pixels: dict[str, npt.NDArray[np.generic] | None] = {}
+        self._pictures: OrderedDict[str, _Picture | None] = OrderedDict()
         self._looks: dict[str, str] = {}
 
     def look(self, texture: Texture) -> Map | None:
@@ -61,70 +74,84 @@ class MapWriter:
     ) -> Map | None:
         """The reflectance map of a texture under diffuse colour D; None where it cannot be had."""
         key = self._key(texture.image)
-        pixels = None if key is None else self._read(texture.image, key)
-        if key is None or pixels is None:
+        picture = None if key is None else self._read(texture.image, key)
+        if key is None or picture is None:
             return None
         name = _name(texture.image, "R", f"{key}|{gamma!r}|{diffuse!r}")
         if name not in self.written:
-            color = linear(pixels, gamma) * np.asarray(diffuse)
-            over = color > 1.0
-            if over.any():
-                share = 100.0 * float(over.any(axis=-1).mean())
+            color = linear(picture, gamma) * np.asarray(diffuse)
+            wrong = ((color > 1.0) | (color < 0.0)).any(axis=-1)
+            if wrong.any():
                 self.report.add(
                     Kind.CLAMPED,
                     "reflectance-clipped",
                     place,
                     thing,
-                    f"{texture.image.name}: reflectance above 1 in {share:.3g} % of the texels "
-                    f"(at most {float(color.max()):.4g}); clipped to 1",
+                    f"{texture.image.name}: reflectance outside 0 to 1 in "
+                    f"{100.0 * float(wrong.mean()):.3g} % of the texels ({float(color.min()):.4g} "
+                    f"to {float(color.max()):.4g}); clipped",
                 )
-            self._write(name, np.minimum(color, 1.0), pixels)
+            self._write(name, np.clip(color, 0.0, 1.0), picture)
             self.written[name] = {
                 "kind": "reflectance",
                 "image": texture.image.name,
                 "gamma": gamma,
                 "diffuse": list(diffuse),
-                "clipped_texels": int(over.any(axis=-1).sum()),
+                "clipped_texels": int(wrong.sum()),
             }
         return Map(f"{self.prefix}/{name}", texture, raw=True)
 
-    def luminance(self, texture: Texture, gamma: float, scale: RGB, *, peak: bool) -> Map | None:
-        """An emission map in linear values times ``scale`` (cd/m2).
+    def luminance(self, texture: Texture, gamma: float, emission: RGB, *, peak: bool) -> Map | None:
+        """An emission map in linear values, of which 1 stands for ``emission`` (cd/m2).
 
-        ``peak``: normalised first, so that the brightest texel has luminance 1.
+        ``peak``: normalised so that its brightest texel, in the light of that colour,
+        has the luminance of ``emission``.
         """
         key = self._key(texture.image)
-        pixels = None if key is None else self._read(texture.image, key)
-        if key is None or pixels is None:
+        picture = None if key is None else self._read(texture.image, key)
+        if key is None or picture is None:
             return None
-        name = _name(texture.image, "L", f"{key}|{gamma!r}|{peak}")
+        # What the channels add to the luminance where the lamp is not white; their sum is 1.
+        weights = np.multiply(LUMINANCE_WEIGHTS, emission)
+        weights = weights / weights.sum() if weights.sum() > 0.0 else np.array(LUMINANCE_WEIGHTS)
+        hue = tuple(np.round(weights, 9).tolist()) if peak else ()
+        name = _name(texture.image, "L", f"{key}|{gamma!r}|{peak}|{hue}")
         if name not in self.written:
-            color = linear(pixels, gamma)
-            top = float((color @ np.asarray(LUMINANCE_WEIGHTS)).max(initial=0.0))
+            color = linear(picture, gamma)
+            top = float((color @ weights).max(initial=0.0))
             if peak and top > 0.0:
                 color = color / top
-            self._write(name, np.minimum(color, _HALF_MAX), pixels)
+            wrong = ((color > _HALF_MAX) | (color < 0.0)).any(axis=-1)
+            if wrong.any():
+                self.report.add(
+                    Kind.CLAMPED,
+                    "emission-clipped",
+                    texture.image.source,
+                    texture.image.name,
+                    f"{int(wrong.sum())} texels outside 0 to {_HALF_MAX:g}; clipped",
+                )
+            self._write(name, np.clip(color, 0.0, _HALF_MAX), picture)
             self.written[name] = {
                 "kind": "hdr" if peak else "emission",
                 "image": texture.image.name,
                 "gamma": gamma,
                 "peak_before": top,
             }
-        return Map(f"{self.prefix}/{name}", texture, raw=True, scale=scale)
+        return Map(f"{self.prefix}/{name}", texture, raw=True, scale=emission)
 
-    def _write(self, name: str, color: Floats, pixels: npt.NDArray[np.generic]) -> None:
-        channels = pixels.shape[2]
+    def _write(self, name: str, color: Floats, picture: _Picture) -> None:
+        pixels, channels = picture.pixels, picture.pixels.shape[2]
         if channels in (2, 4):
             alpha = pixels[..., channels - 1 :].astype(np.float64)
             alpha = alpha / 255.0 if pixels.dtype == np.uint8 else alpha
-            color = np.concatenate([color, alpha], axis=-1)
+            color = np.concatenate([color, np.clip(np.nan_to_num(alpha), 0.0, 1.0)], axis=-1)
         write_exr(self.folder / name, color, half=True, luminance=False)
 
     def _copy(self, image: Image, key: str) -> str | None:
-        pixels = self._read(image, key)
-        if pixels is None:
+        picture = self._read(image, key)
+        if picture is None:
             return None
-        data = image.data if image.data is not None else None
+        data = image.data
         if data is None and image.path is not None:
             data = image.path.read_bytes()
         suffix = _suffix(data)
@@ -134,7 +161,7 @@ class MapWriter:
             (self.folder / name).write_bytes(data)
         else:
             name = _name(image, "", key, ".png")
-            write_png(self.folder / name, _eight_bit(pixels))
+            write_png(self.folder / name, _eight_bit(picture.pixels))
         self.written.setdefault(name, {"kind": "look", "image": image.name})
         return name
 
@@ -146,32 +173,40 @@ class MapWriter:
         data = image.data if image.data is not None else _bytes(image.pixels)
         return hashlib.sha256(data).hexdigest()
 
-    def _read(self, image: Image, key: str) -> npt.NDArray[np.generic] | None:
-        if key not in self._pixels:
-            try:
-                if image.pixels is not None:
-                    self._pixels[key] = image.pixels.reshape(*image.pixels.shape[:2], -1)
-                else:
-                    path = image.path or Path(_stem(image) + (_suffix(image.data) or ".img"))
-                    self._pixels[key] = read_image(path, image.data).pixels
-            except InputError as problem:
-                self.report.add(
-                    Kind.INVALID, "image-broken", image.source, image.name, problem.problem
-                )
-                self._pixels[key] = None
-        return self._pixels[key]
+    def _read(self, image: Image, key: str) -> _Picture | None:
+        if key not in self._pictures:
+            self._pictures[key] = self._decode(image)
+            while self._size() > _KEPT and len(self._pictures) > 1:
+                self._pictures.popitem(last=False)
+        return self._pictures[key]
+
+    def _size(self) -> int:
+        return sum(p.pixels.nbytes for p in self._pictures.values() if p is not None)
+
+    def _decode(self, image: Image) -> _Picture | None:
+        if image.pixels is not None:
+            return _Picture(image.pixels.reshape(*image.pixels.shape[:2], -1), integers=True)
+        path = image.path or Path(_stem(image) + (_suffix(image.data) or ".img"))
+        try:
+            found = read_image(path, image.data)
+        except InputError as problem:
+            self.report.add(Kind.INVALID, "image-broken", image.source, image.name, problem.problem)
+            return None
+        return _Picture(found.pixels, found.integers)
 
 
-def linear(pixels: npt.NDArray[np.generic], gamma: float) -> Floats:
-    """Colour of an image in linear values, (h, w, 3): T^gamma for integers, floats as they are.
+def linear(picture: _Picture, gamma: float) -> Floats:
+    """Colour in linear values, (h, w, 3): T^gamma for integer codes, floats as they are.
 
     8-bit codes go through a table, which is exact; grey is spread over three channels.
     """
+    pixels = picture.pixels
     color = pixels[..., :1] if pixels.shape[2] < 3 else pixels[..., :3]
     if pixels.dtype == np.uint8:
         values = reflectance_table(gamma, 1.0)[color]
     else:
         values = np.nan_to_num(color.astype(np.float64), posinf=_HALF_MAX, neginf=0.0)
+        values = values**gamma if picture.integers else values
     return np.asarray(np.broadcast_to(values, (*pixels.shape[:2], 3)))
 
 

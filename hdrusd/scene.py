@@ -187,3 +187,4 @@ class ImageData:
 
     pixels: npt.NDArray[np.generic]
     path: Path | None = None
+    integers: bool = False  # the file has integer codes: a picture, not light

@@ -4,8 +4,9 @@
 
 A legacy file is converted, checked and rendered; a USD file is described and rendered. Each
 command runs in a process of its own under limits. A file passes when it ends in a picture
-with light in it, or in one line on standard error and a documented exit code; either way
-nothing may be written outside the output folder and nothing half-written may stay.
+with light in it (black where all its materials are), or in one line on standard error and a
+documented exit code; either way nothing may be written outside the output folder and nothing
+half-written may stay.
 
 A file in ``set/model/...`` below DIR may name files anywhere in ``set/model`` (``--root``),
 because some models keep their textures beside the folder of their meshes.
@@ -69,6 +70,7 @@ class Row:
     counts: dict[str, int] = field(default_factory=dict)
     findings: int | None = None  # of conversion and rendering together
     lit: float = 0.0  # share of the pixels above 0 cd/m2
+    dark: bool = False  # no material of it reflects or emits
     problem: str = ""
 
     @property
@@ -78,6 +80,8 @@ class Row:
             return f"**{self.problem}**"
         if self.code:
             return f"exit {self.code}: {self.message}"
+        if self.dark:
+            return "picture, black as its materials"
         return f"picture, {self.lit:.0%} lit" if self.lit >= 0.01 else "picture, under 1% lit"
 
     def cells(self) -> list[str]:
@@ -101,8 +105,9 @@ class RefusedError(Exception):
 
 def corpus_files(folder: Path, only: str = "*") -> list[Path]:
     """The databases and stages below ``folder`` whose relative path matches ``only``."""
-    found = (path for path in folder.rglob("*") if path.suffix.lower() in LEGACY + STAGES)
-    return sorted(p for p in found if p.is_file() and fnmatch(p.relative_to(folder).as_posix(), only))
+    known = (path for path in folder.rglob("*") if path.suffix.lower() in LEGACY + STAGES)
+    files = (path for path in known if path.is_file())
+    return sorted(path for path in files if fnmatch(path.relative_to(folder).as_posix(), only))
 
 
 def run_corpus(
@@ -122,7 +127,7 @@ def _try(folder: Path, file: Path, output: Path) -> Row:
     try:
         case.run(row)
     except RefusedError as refusal:
-        row.code, row.message = refusal.code, str(refusal)
+        row.code, row.message = refusal.code, str(refusal).replace(f"{folder}/", "")
     except WrongError as wrong:
         row.problem = str(wrong)
     row.seconds = time.perf_counter() - start
@@ -168,6 +173,7 @@ class Case:
                 "lights": len(converted["lights"]),
             }
             row.findings = len(converted["findings"])
+            row.dark = _reflects_nothing(converted["materials"])
             self._hdrusd(["check", str(stage)])
         exr, png = self.out / "frame.exr", self.out / "frame.png"
         size = ["--imageWidth", str(WIDTH), "--imageHeight", str(HEIGHT)]
@@ -181,8 +187,9 @@ class Case:
         if not png.is_file():
             raise WrongError("no PNG")
         row.lit = float((rgb.max(axis=-1) > 0.0).mean())
-        if row.lit == 0.0:
+        if row.lit == 0.0 and not (row.dark and row.counts["triangles"]):
             raise WrongError("the picture is black")
+        row.dark = row.lit == 0.0
 
     def strays(self, *, refused: bool) -> str:
         """What lies where nothing may lie; empty when all is well."""
@@ -238,6 +245,13 @@ class Case:
         if len(lines) != 1:
             raise WrongError(f"{command}: exit {code} with {len(lines)} lines on standard error")
         raise RefusedError(code, lines[0])
+
+
+def _reflects_nothing(materials: list[dict[str, Any]]) -> bool:
+    return bool(materials) and not any(
+        any(material["diffuse"]) or material["reflectance_map"] or material["luminance_cd_m2"]
+        for material in materials
+    )
 
 
 def listing(folder: Path) -> dict[str, tuple[int, int]]:

@@ -155,7 +155,7 @@ class StageReader:
         )
 
     def camera_prim(self, path: str | None) -> Usd.Prim | None:
-        """The camera prim by path or by name; the first of the stage when ``path`` is None.
+        """The camera prim by path, by its name or its node's; the stage's first for None.
 
         Raises InputError when it is named and not there.
         """
@@ -170,7 +170,7 @@ class StageReader:
             self._cameras[path] = cameras[0] if cameras else None
             return self._cameras[path]
         for prim in cameras:
-            if path in (str(prim.GetPath()), prim.GetName()):
+            if path in (str(prim.GetPath()), prim.GetName(), prim.GetParent().GetName()):
                 self._cameras[path] = prim
                 return prim
         known = ", ".join(str(prim.GetPath()) for prim in cameras) or "none"

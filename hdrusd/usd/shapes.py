@@ -54,11 +54,12 @@ def _round(kind: Any, radius: float, height: float, axis: str) -> Shape:
     h = height / 2
     if kind is UsdGeom.Cylinder:
         r, z = [0, radius, radius, radius, radius, 0], [-h, -h, -h, h, h, h]
-        nr, nz = [0, 0, 1, 1, 0, 0], [-1, -1, 0, 0, 1, 1]
+        nr, nz = [0.0, 0.0, 1.0, 1.0, 0.0, 0.0], [-1.0, -1.0, 0.0, 0.0, 1.0, 1.0]
     elif kind is UsdGeom.Cone:
         slope = float(np.hypot(height, radius)) or 1.0
         r, z = [0, radius, radius, 0], [-h, -h, -h, h]
-        nr, nz = [0, 0, height / slope, height / slope], [-1, -1, radius / slope, radius / slope]
+        nr = [0.0, 0.0, height / slope, height / slope]
+        nz = [-1.0, -1.0, radius / slope, radius / slope]
     else:
         angle = np.linspace(-np.pi / 2, np.pi / 2, SIDES // 2 + 2)
         nr, nz = list(np.cos(angle)), list(np.sin(angle))

@@ -104,7 +104,7 @@ def main() -> None:
         "--operator", "falsecolour", "--set", "scale=1000", "--set", "decades=4")  # fmt: skip
     day = write_daylight(out)
     run(HDRUSD, "render", day, frames / "daylight.####.png", "--frames", rows,
-        "--camera", "Camera", "--operator", "exposure", "--enableDomeLightVisibility",
+        "--camera", "Driver", "--operator", "exposure", "--enableDomeLightVisibility",
         *width)  # fmt: skip
     sheet = write_sheet(out, ["daylight", "exposure", "reinhard", "falsecolour"])
     print(f"{sheet}: daylight | exposure | Reinhard | false colour")

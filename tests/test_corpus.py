@@ -1,0 +1,186 @@
+"""The corpus run, on files made here and, where they are, on hostile and real ones."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests import corpus
+from tests.corpus import Row, corpus_files, markdown, run_corpus, totals
+
+#: Small real files: each format, texture folders beside the meshes, lights, cameras, packages.
+REAL = (
+    "castle-demo/gltf/punctual_lights/test_lights.glb",
+    "delta3d/examples/data/StaticMeshes/lamps/Lamppost_Trident_PHYSICS.osg",
+    "derived-osg/night_street.osgt",
+    "derived-usd/sedan.usdz",
+    "gazebo/stop_light/meshes/stop_light.obj",
+    "gltf-blender-io/22_vertex_color/22_vertex_color.gltf",
+    "godot-demos/truck_town/town/lamp/scene.gltf",
+    "kenney/models/road-straight.glb",
+    "openmaterial/lights/pointLight.gltf",
+    "osgearth/data/red_flag.osg",
+    "tinyobjloader/tr-and-d-issue-43.obj",
+    "usd-wg/test_assets/TextureTransformTest/TextureTransformTest.usd",
+)
+
+#: What of the hostile files has nothing in it that can be trusted, and must be refused as input.
+BROKEN = (
+    "dag_two_parents.gltf",
+    "empty.glb",
+    "empty.obj",
+    "empty.osgt",
+    "empty.usda",
+    "empty.usdc",
+    "huge_count.gltf",
+    "huge_glb_chunk.glb",
+    "node_cycle.gltf",
+    "png_named.obj",
+    "uri_file.gltf",
+)
+
+#: What of them is whole but for textures and names, and must still be shown.
+USABLE = (
+    "dev_zero.obj",
+    "huge_png.obj",
+    "long_line.obj",
+    "missing_tex.obj",
+    "names.obj",
+    "traversal_tex.obj",
+    "uri_traversal.gltf",
+)
+
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
+
+STAGE = '#usda 1.0\n( metersPerUnit = 1 )\ndef {kind} "Thing" {{}}\n'
+
+
+def run(folder: Path, files: Sequence[Path], output: Path) -> dict[str, Row]:
+    """Rows by name; two at a time."""
+    return {row.name: row for row in run_corpus(folder, files, output, workers=2)}
+
+
+def problems(rows: dict[str, Row]) -> dict[str, str]:
+    """The files that did not pass, and why."""
+    return {name: row.problem for name, row in rows.items() if row.problem}
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    """An empty folder of databases."""
+    folder = tmp_path / "data"
+    folder.mkdir()
+    return folder
+
+
+@pytest.fixture
+def output(tmp_path: Path) -> Path:
+    """A folder for results."""
+    folder = tmp_path / "results"
+    folder.mkdir()
+    return folder
+
+
+@pytest.mark.usefixtures("gl")
+def test_pictures_and_refusals_pass(source: Path, output: Path) -> None:
+    (source / "square.obj").write_text(SQUARE)
+    (source / "black.obj").write_text("mtllib black.mtl\n" + SQUARE.replace("f", "usemtl k\nf"))
+    (source / "black.mtl").write_text("newmtl k\nKd 0 0 0\n")
+    (source / "empty.osgt").write_text("")
+    (source / "sphere.usda").write_text(STAGE.format(kind="Sphere"))
+    (source / "nothing.usda").write_text(STAGE.format(kind="Scope"))
+    (source / "notes.txt").write_text("no database")
+    rows = run(source, corpus_files(source), output)
+    assert problems(rows) == {}
+    assert list(rows) == ["black.obj", "empty.osgt", "nothing.usda", "sphere.usda", "square.obj"]
+    assert rows["square.obj"].counts["triangles"] == 2
+    assert rows["square.obj"].lit > 0.0
+    assert rows["sphere.usda"].lit > 0.0
+    assert rows["black.obj"].dark
+    assert {name: row.code for name, row in rows.items() if row.code} == {
+        "empty.osgt": 3,
+        "nothing.usda": 3,
+    }
+    assert totals(list(rows.values())) == "5 files: 3 pictures, 2 refused, 0 wrong."
+    table = markdown(list(rows.values()))
+    assert str(source) not in table
+    assert len(table.splitlines()) == 2 + 5 + 2
+
+
+@pytest.mark.parametrize(
+    ("program", "problem"),
+    [
+        ("import sys; sys.exit('no')", ""),
+        ("import sys; print('a', file=sys.stderr); sys.exit('b')", "2 lines"),
+        ("import sys; sys.exit(1)", "0 lines"),
+        ("import sys; sys.exit(99)", "not documented"),
+        ("1 / 0", "traceback: ZeroDivisionError"),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "signal 11"),
+        ("import time; time.sleep(60)", "still running"),
+        ("import sys; open('core', 'w'); sys.exit('no')", "left behind: cwd/core"),
+        ("import sys, tempfile; tempfile.mkstemp('x', 'x'); sys.exit('no')", "left behind: tmp/x"),
+        ("import sys; open('../out/half.usda', 'w'); sys.exit('no')", "left behind: out/half"),
+        ("import sys; open('../../../data/x', 'w'); sys.exit('no')", "source folder"),
+        ("import sys; open('../beside', 'w'); sys.exit('no')", "left behind: beside"),
+        ("bytearray(3 << 30)", "traceback: MemoryError"),
+    ],
+)
+def test_what_a_command_does_wrong_is_told(
+    source: Path, output: Path, monkeypatch: pytest.MonkeyPatch, program: str, problem: str
+) -> None:
+    head, _, _ = corpus._PROGRAM.partition("from hdrusd")
+    monkeypatch.setattr(corpus, "_PROGRAM", head + program)
+    monkeypatch.setattr(corpus, "SECONDS", 2.0)
+    (source / "square.obj").write_text(SQUARE)
+    (row,) = run(source, corpus_files(source), output).values()
+    assert problem in row.problem
+    assert bool(problem) == bool(row.problem)
+
+
+def test_a_frame_without_light_is_wrong(
+    source: Path, output: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answer: dict[str, Any] = {
+        "counts": {"triangles": 1},
+        "materials": [{"diffuse": [1, 1, 1], "reflectance_map": None, "luminance_cd_m2": 0}],
+        "textures": {},
+        "lights": [],
+        "findings": [],
+    }
+    program = f"""
+import sys, numpy as np
+from pathlib import Path
+from hdrusd.images import write_exr, write_png
+if sys.argv[1] == "render":
+    write_exr(Path(sys.argv[3]), np.zeros(({corpus.HEIGHT}, {corpus.WIDTH}, 3)))
+    write_png(Path(sys.argv[5]), np.zeros(({corpus.HEIGHT}, {corpus.WIDTH}, 3), np.uint8))
+print({json.dumps(json.dumps(answer))})
+"""
+    monkeypatch.setattr(corpus, "_PROGRAM", program.replace("{", "{{").replace("}", "}}"))
+    (source / "square.obj").write_text(SQUARE)
+    (row,) = run(source, corpus_files(source), output).values()
+    assert row.problem == "the picture is black"
+
+
+@pytest.mark.usefixtures("gl")
+def test_hostile_files(testdata: Path, output: Path) -> None:
+    folder = testdata / "data"
+    files = corpus_files(folder, "hostile/*")
+    rows = {Path(name).name: row for name, row in run(folder, files, output).items()}
+    assert problems(rows) == {}
+    assert {name: rows[name].code for name in BROKEN} == dict.fromkeys(BROKEN, 3)
+    assert {name: rows[name].code for name in USABLE} == dict.fromkeys(USABLE, 0)
+    assert all(rows[name].findings for name in USABLE)
+
+
+@pytest.mark.usefixtures("gl")
+def test_real_files(testdata: Path, output: Path) -> None:
+    folder = testdata / "data"
+    rows = run(folder, [folder / name for name in REAL], output)
+    assert problems(rows) == {}
+    refused = [name for name, row in rows.items() if row.code]
+    assert refused == ["openmaterial/lights/pointLight.gltf"]  # lights alone
