@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
+import traceback
 from importlib import import_module
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 
 import click
 
@@ -39,7 +40,10 @@ class Commands(click.Group):
             command: click.Command = module.command
             return command
         for entry in entry_points(group="hdrusd.commands", name=cmd_name):
-            loaded: click.Command = entry.load()
+            try:
+                loaded: click.Command = entry.load()
+            except Exception as problem:  # whatever a stranger's module raises
+                return _broken(entry, problem)
             return loaded
         return None
 
@@ -63,6 +67,21 @@ class Commands(click.Group):
                 raise
             hint = f"{error.message} Did you mean {near[0]!r}?"
             raise click.UsageError(hint, ctx) from error
+
+
+def _broken(entry: EntryPoint, problem: Exception) -> click.Command:
+    """Stands in for a plug-in that cannot be imported: the others and ``--help`` still work."""
+
+    def tell(**_: object) -> None:
+        click.echo("".join(traceback.format_exception(problem)), err=True, nl=False)
+        raise HdrusdError(f"{entry.name}: the plug-in {entry.value} cannot be loaded")
+
+    swallow = click.Argument(["arguments"], nargs=-1, type=click.UNPROCESSED)
+    settings = {"ignore_unknown_options": True}
+    help_text = "A plug-in that cannot be loaded."
+    return click.Command(
+        entry.name, settings, tell, [swallow], help=help_text, short_help=help_text
+    )
 
 
 @click.group(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from hdrusd.errors import HdrusdError, InputError
+from hdrusd.errors import InputError
 from hdrusd.frames import check_pattern, find_frames, frame_path, has_placeholder, parse_frames
 
 from .options import (
@@ -53,14 +53,13 @@ def command(
         raise click.UsageError(f"{output}: want a name that ends in .png")
     if frames is not None:
         times = parse_frames(frames)
+        check_pattern(source, times)
         pairs = [(time, frame_path(source, time)) for time in times]
     else:
         pairs = find_frames(source)
     if not pairs:
         raise InputError(Path(source), "no such frames")
     check_pattern(output, [time for time, _ in pairs] if has_placeholder(source) else None)
-    if frames is not None and not has_placeholder(source):
-        raise HdrusdError(f"{source}: no frame placeholder; want one, as in in.####.exr")
 
     from hdrusd.display import tonemap_sequence
     from hdrusd.report import Report

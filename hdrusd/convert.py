@@ -332,7 +332,7 @@ def _node_camera(place: Place, rule: Rule) -> legacy.Camera:
 def _temperature_rgb(kelvin: float) -> legacy.RGB:
     """USD's own blackbody colour, luminance 1; its range is 1000 to 10000 K."""
     r, g, b = UsdLux.BlackbodyTemperatureAsRgb(min(max(kelvin, 1000.0), 10_000.0))
-    return float(r), float(g), float(b)
+    return chromaticity((r, g, b))[0]
 
 
 def _light_row(

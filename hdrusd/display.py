@@ -58,7 +58,8 @@ def add_legend(picture: npt.NDArray[np.uint8], operator: Operator, settings: Par
 def encode(linear: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
     """Display-linear [0, 1], (h, w, 3), as dithered 8-bit sRGB: what shader 2 does last."""
     rows, columns = np.mgrid[0 : linear.shape[0], 0 : linear.shape[1]]
-    return np.asarray(quantise(srgb_encode(linear), dither(columns, rows)), np.uint8)
+    offset = dither(columns, rows)[..., None]  # the same for all three channels
+    return np.asarray(quantise(srgb_encode(linear), offset), np.uint8)
 
 
 def tonemap_sequence(

@@ -146,8 +146,8 @@ class Case:
     home: Path
 
     def __post_init__(self) -> None:
-        for name in ("out", "cwd", "tmp"):
-            (self.home / name).mkdir(parents=True)
+        for path in (self.out, *self._empty()):
+            path.mkdir(parents=True)
 
     @property
     def out(self) -> Path:
@@ -193,14 +193,18 @@ class Case:
 
     def strays(self, *, refused: bool) -> str:
         """What lies where nothing may lie; empty when all is well."""
-        wrong = [self.home / name for name in ("cwd", "tmp") if any((self.home / name).iterdir())]
-        wrong += [p for p in self.home.iterdir() if p.name not in ("out", "cwd", "tmp")]
-        wrong += [p for p in self.out.rglob(".*") if p not in wrong]
-        if refused:  # a refusal of the renderer leaves the stage; one of convert leaves nothing
-            whole = (self.out / "stage.usda").is_file()
-            wrong += [] if whole else list(self.out.iterdir())
+        wrong = [path for path in self.home.rglob("*") if not path.is_relative_to(self.out)]
+        wrong = [path for path in wrong if path not in (self.out, *self._empty())]
+        wrong += self.out.rglob(".*")  # temporary files
+        if refused:
+            wrong += self.out.glob("frame.*")
+            if not (self.out / "stage.usda").is_file():  # it was convert that refused
+                wrong += self.out.iterdir()
         names = sorted({path.relative_to(self.home).as_posix() for path in wrong})
         return f"left behind: {', '.join(names)}" if names else ""
+
+    def _empty(self) -> tuple[Path, Path]:
+        return self.home / "cwd", self.home / "tmp"
 
     def _roots(self) -> list[str]:
         parts = self.file.relative_to(self.folder).parts[:-1]

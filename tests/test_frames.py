@@ -136,7 +136,9 @@ def test_frames_are_found_by_number(tmp_path: Path) -> None:
 
 
 @given(st.lists(st.integers(-99, 20000), min_size=1, max_size=5, unique=True))
-def test_what_was_named_is_found(tmp_path_factory: pytest.TempPathFactory, times: list[int]) -> None:
+def test_what_was_named_is_found(
+    tmp_path_factory: pytest.TempPathFactory, times: list[int]
+) -> None:
     folder = tmp_path_factory.mktemp("frames")
     for pattern in ("f.####.exr", "f.##.##.exr"):
         for time in times:

@@ -22,9 +22,12 @@ import moderngl
 import numpy as np
 
 from hdrusd.convert import Options, convert
+from hdrusd.errors import SourceRef
 from hdrusd.gpu.context import create_context, describe
-from hdrusd.images import write_exr
-from hdrusd.maps import linear
+from hdrusd.images import write_exr, write_png
+from hdrusd.legacy.scene import Image, Texture
+from hdrusd.maps import MapWriter
+from hdrusd.photometry.reflectance import reflectance_table
 from hdrusd.render import Job, Renderer, render_sequence
 from hdrusd.report import Report
 from hdrusd.scene import LIGHT, NO_CONE, RenderScene
@@ -153,13 +156,31 @@ def bench_convert(database: Path, folder: Path) -> list[str]:
         size = sum(f.stat().st_size for f in database.rglob("*") if f.suffix != ".toml") / 2e6
         taken = measure(lambda n=name: convert(database / n, folder / "c.usda", Options()), 3)
         rows.append(f"| {name} with its textures | {taken} | {size / taken.wall:.1f} MB/s |")
-    codes = np.random.default_rng(1).integers(0, 256, (2048, 2048, 3), np.uint8)
-    table = measure(lambda: linear(codes, 2.2), 3)
-    power = measure(lambda: (codes / 255.0) ** 2.2, 3)
+    # Noise over a ramp: neither flat nor incompressible, as photographs are.
+    ramp = np.linspace(0, 230, 2048)[None, :, None] + np.random.default_rng(1).integers(
+        0, 25, (2048, 2048, 3)
+    )
+    codes = ramp.astype(np.uint8)
     megapixels = codes.shape[0] * codes.shape[1] / 1e6
+    table = measure(lambda: reflectance_table(2.2, 0.8)[codes], 3)
+    power = measure(lambda: (codes / 255.0) ** 2.2 * 0.8, 3)
     rows.append(
-        f"| T^2.2, 2048 x 2048 | {table} | {megapixels / table.wall:.0f} MP/s, "
+        f"| T^2.2 D by table, 2048 x 2048 | {table} | {megapixels / table.wall:.0f} MP/s, "
         f"{power.wall / table.wall:.1f} x numpy's power |"
+    )
+    picture = folder / "picture.png"
+    write_png(picture, codes)
+    place = SourceRef(picture)
+    texture = Texture(Image("picture.png", place, path=picture))
+
+    def file_to_file() -> None:
+        MapWriter(folder / "maps", "maps", Report()).reflectance(
+            texture, (0.8, 0.8, 0.8), 2.2, place, "paint"
+        )
+
+    taken = measure(file_to_file, 3)
+    rows.append(
+        f"| PNG to reflectance EXR, 2048 x 2048 | {taken} | {megapixels / taken.wall:.1f} MP/s |"
     )
     return rows
 

@@ -77,7 +77,9 @@ def waves(cells: int = 24, key: str = "waves") -> Geometry:
     )
 
 
-def draw(geometry: Geometry, material: int = 0, *matrices: Array, double_sided: bool = False) -> Draw:
+def draw(
+    geometry: Geometry, material: int = 0, *matrices: Array, double_sided: bool = False
+) -> Draw:
     """One draw, at the origin unless matrices (row vectors) are given."""
     return Draw(geometry, material, np.array(matrices or [np.eye(4)]), double_sided)
 

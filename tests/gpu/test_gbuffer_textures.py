@@ -21,7 +21,9 @@ PICTURE = RNG.uniform(0.0, 1.0, (4, 6, 4)).astype(np.float32)
 
 def texture(file: str = "a.exr", **fields: Any) -> TextureUse:
     names = ("decode", "wrap_s", "wrap_t")
-    ref = TextureRef(file, **({"decode": "linear"} | {n: fields.pop(n) for n in names if n in fields}))
+    ref = TextureRef(
+        file, **({"decode": "linear"} | {n: fields.pop(n) for n in names if n in fields})
+    )
     return TextureUse(texture=ref, **fields)
 
 
@@ -37,9 +39,7 @@ def scene(material: Material, **uvs: Any) -> RenderScene:
 
 def shown(gl: Any, made: RenderScene, pictures: dict[str, Array] | None = None) -> Rendered:
     images = pictures or {"a.exr": PICTURE}
-    got = render(
-        gl, made, lambda ref: ImageData(images[ref.file]) if ref.file in images else None
-    )
+    got = render(gl, made, lambda ref: ImageData(images[ref.file]) if ref.file in images else None)
     assert got.surface.sum() > 1000
     return got
 
@@ -104,7 +104,9 @@ def test_scale_and_bias(gl: Any) -> None:
     got = shown(gl, made)
     wanted = bilinear(PICTURE, coordinates(made, got.surface), "repeat", "repeat")
     wanted = wanted[:, :3] * scale[:3] + np.array(bias[:3])
-    np.testing.assert_allclose(got.frame[got.surface] / scale[:3], wanted / scale[:3], atol=2 * FILTER)
+    np.testing.assert_allclose(
+        got.frame[got.surface] / scale[:3], wanted / scale[:3], atol=2 * FILTER
+    )
 
 
 def test_negative_emission_is_dark(gl: Any) -> None:
@@ -169,7 +171,9 @@ def test_vertex_colour_multiplies_the_map(gl: Any) -> None:
 def test_missing_texture_shows_its_fallback(gl: Any) -> None:
     use = texture("not there.png", fallback=(0.1, 0.2, 0.3, 1.0))
     got = shown(gl, scene(Material(diffuse_map=use)))
-    np.testing.assert_allclose(got.diffuse[got.surface], np.tile([0.1, 0.2, 0.3], (got.surface.sum(), 1)), rtol=1e-6)
+    np.testing.assert_allclose(
+        got.diffuse[got.surface], np.tile([0.1, 0.2, 0.3], (got.surface.sum(), 1)), rtol=1e-6
+    )
 
 
 def test_missing_texture_beside_one_that_is_there(gl: Any) -> None:

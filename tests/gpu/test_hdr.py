@@ -153,7 +153,9 @@ def test_ambient_and_emission_are_added_once(gl: Any) -> None:
     )
     got = render(gl, scene)
     wanted = np.array([7, 8, 9]) + np.array([0.5, 0.4, 0.3]) * np.array([10, 20, 30]) / math.pi
-    np.testing.assert_allclose(got.frame[got.surface], np.tile(wanted, (got.surface.sum(), 1)), 1e-6)
+    np.testing.assert_allclose(
+        got.frame[got.surface], np.tile(wanted, (got.surface.sum(), 1)), 1e-6
+    )
 
 
 @pytest.mark.parametrize("distance", [1e3, 1e6])
@@ -196,7 +198,9 @@ def test_back_faces_are_not_drawn(gl: Any) -> None:
 def test_double_sided_faces_the_eye(gl: Any) -> None:
     got = render(gl, from_behind(double_sided=True))
     assert got.surface.any()
-    np.testing.assert_allclose(got.normal[got.surface], np.tile([0, 0, -1.0], (got.surface.sum(), 1)))
+    np.testing.assert_allclose(
+        got.normal[got.surface], np.tile([0, 0, -1.0], (got.surface.sum(), 1))
+    )
     assert got.frame[got.surface].min() > 0.0
 
 

@@ -101,7 +101,9 @@ def render_case(
             pass
 
 
-def check(folder: Path, output: Path, cases: Sequence[Case], variant: str | None) -> tuple[bool, str]:
+def check(
+    folder: Path, output: Path, cases: Sequence[Case], variant: str | None
+) -> tuple[bool, str]:
     """Whether the rendered cases are right, and a line a case that says so."""
     checker = folder / "check_exr.py"
     if not checker.is_file():
@@ -154,6 +156,7 @@ def blinn_phong_session(case: Case, output: Path) -> Path:
     )
     layer = output / f"{case.id}.session.usda"
     layer.write_text(
-        f'#usda 1.0\n\nover "World"\n{{\n    over "Looks"\n    {{{overs}    }}\n}}\n', encoding="utf-8"
+        f'#usda 1.0\n\nover "World"\n{{\n    over "Looks"\n    {{{overs}    }}\n}}\n',
+        encoding="utf-8",
     )
     return layer

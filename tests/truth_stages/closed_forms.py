@@ -45,13 +45,17 @@ def plane(z: float = 0.0, eye: tuple[float, ...] = (0.0, 0.0, 4.0)) -> Array:
 def point_lux(at: Array, candela: float, place: tuple[float, ...]) -> Array:
     """(h, w, 1) lux on an upward plane: I cos(theta) / d^2."""
     to_light = np.asarray(place) - at
-    return np.asarray(candela * to_light[..., 2:] / np.linalg.norm(to_light, axis=-1, keepdims=True) ** 3)
+    return np.asarray(
+        candela * to_light[..., 2:] / np.linalg.norm(to_light, axis=-1, keepdims=True) ** 3
+    )
 
 
 def from_axis(at: Array, place: tuple[float, ...], axis: tuple[float, ...]) -> Array:
     """(h, w, 1) cosine of the angle at the lamp between its axis and the way to the point."""
     away = at - np.asarray(place)
-    return np.asarray((away @ np.asarray(axis))[..., None] / np.linalg.norm(away, axis=-1, keepdims=True))
+    return np.asarray(
+        (away @ np.asarray(axis))[..., None] / np.linalg.norm(away, axis=-1, keepdims=True)
+    )
 
 
 def inside(at: Array, x: tuple[float, float], y: tuple[float, float]) -> Array:
@@ -253,7 +257,9 @@ def png(code: int) -> bytes:
     """A picture of one 8-bit RGB pixel, all channels ``code``."""
 
     def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        return (
+            struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        )
 
     header = struct.pack(">IIBBBBB", 1, 1, 8, 2, 0, 0, 0)
     row = zlib.compress(bytes([0, code, code, code]))
