@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import OpenEXR
-import OpenImageIO as oiio  # noqa: N813 (the name its own documentation uses)
+import OpenImageIO as oiio
 
 from hdrusd.errors import HdrusdError, InputError
 from hdrusd.scene import ImageData

@@ -40,12 +40,13 @@ def panel(
     color: tuple[float, ...] = (0, 1, 0),
 ) -> str:
     """A green square half a metre above the ground, with further attributes."""
+    corners = [(x[0], -0.5, 0.5), (x[1], -0.5, 0.5), (x[1], 0.5, 0.5), (x[0], 0.5, 0.5)]
     return f"""\
 def Mesh "{name}"
 {{
     int[] faceVertexCounts = [4]
     int[] faceVertexIndices = [0, 1, 2, 3]
-    point3f[] points = [({x[0]}, -0.5, 0.5), ({x[1]}, -0.5, 0.5), ({x[1]}, 0.5, 0.5), ({x[0]}, 0.5, 0.5)]
+    point3f[] points = {corners}
     color3f[] primvars:displayColor = [{color}]
     uniform token subdivisionScheme = "none"
     {inside}

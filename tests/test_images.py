@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import OpenEXR
-import OpenImageIO as oiio  # noqa: N813 (the name its own documentation uses)
+import OpenImageIO as oiio
 import pytest
 
 from hdrusd.errors import HdrusdError, InputError

@@ -133,7 +133,8 @@ class Mesh:
 @dataclass(frozen=True, slots=True)
 class Light:
     """A light as the file has it. It sits at its node's origin looking along the node's -Z
-    unless ``position`` / ``direction`` (node space) say otherwise."""
+    unless ``position`` / ``direction`` (node space) say otherwise.
+    """
 
     name: str
     source: SourceRef

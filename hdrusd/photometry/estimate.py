@@ -19,6 +19,9 @@ from hdrusd.registry import Registry
 #: scene's diagonal, but at least this many metres.
 MIN_REFERENCE_DISTANCE = 1.0
 
+#: No reference distance is longer, m: an attenuation that hardly falls says little of a lamp.
+MAX_REFERENCE_DISTANCE = 1000.0
+
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
@@ -51,12 +54,14 @@ def reference_distance(light: Light, diagonal: float) -> float:
     wanted = 2.0 * k0 if k0 > 0.0 else 2.0
     c = k0 - wanted
     if k2 > 0.0:
-        distance = (-k1 + math.sqrt(max(k1 * k1 - 4.0 * k2 * c, 0.0))) / (2.0 * k2)
+        # 2 c / (-b - root): the other form cancels where k2 is small, and divides by it.
+        distance = -2.0 * c / (k1 + math.sqrt(max(k1 * k1 - 4.0 * k2 * c, 0.0)))
     elif k1 > 0.0:
         distance = -c / k1
     else:
         distance = 0.1 * diagonal
-    return max(distance, 1e-3) if k1 > 0.0 or k2 > 0.0 else max(distance, MIN_REFERENCE_DISTANCE)
+    least = 1e-3 if k1 > 0.0 or k2 > 0.0 else MIN_REFERENCE_DISTANCE
+    return min(max(distance, least), MAX_REFERENCE_DISTANCE)
 
 
 def attenuation(light: Light, distance: float) -> float:
@@ -71,7 +76,8 @@ def _rule(name: str, lux: float, text: str) -> Estimate:
         if light.kind == "directional":
             return lux
         distance = reference_distance(light, diagonal)
-        return lux * attenuation(light, distance) * distance * distance
+        # Above 1 OpenGL clamps the colour, so a picture shows no more.
+        return lux * min(attenuation(light, distance), 1.0) * distance * distance
 
     return Estimate(name, text, strength, lux / math.pi, lux)
 

@@ -162,7 +162,7 @@ def stage(tmp_path: Path) -> Path:
 def test_plug_in_that_cannot_be_imported_spares_the_rest(
     hdrusd: CommandLine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """hdrusd --help works; the broken command says so itself, once it is called."""
+    """Hdrusd --help works; the broken command says so itself, once it is called."""
 
     class Broken:
         name = "lamp"
@@ -183,7 +183,7 @@ def test_plug_in_that_cannot_be_imported_spares_the_rest(
 
 
 def test_closed_pipe_is_no_error(stage: Path) -> None:
-    """``hdrusd operators | true``: nobody listens, nothing is said."""
+    """As in ``hdrusd operators | true``: nobody listens, nothing is said."""
     run = subprocess.run(
         [
             "bash",

@@ -236,7 +236,7 @@ def test_hostile_stages(hdrusd: CommandLine, testdata: Path, tmp_path: Path, nam
 
 
 def test_without_a_driver_one_line_says_what_to_install(stage: Path, tmp_path: Path) -> None:
-    """libglvnd with no vendor: EGL is there and has no device."""
+    """With libglvnd and no vendor EGL is there and has no device."""
     said = process("render", stage, tmp_path / "a.exr", __EGL_VENDOR_LIBRARY_FILENAMES="/dev/null")
     if said.code == 0:
         pytest.skip("this machine's EGL is not libglvnd's")
@@ -255,8 +255,10 @@ def test_interrupt_leaves_whole_frames_only(gl: Any, tmp_path: Path) -> None:
     stage = write_stage(tmp_path / "a.usda", GROUND, SKY, panel("Panel"), camera=moving)
     frames = tmp_path / "frames"
     job = subprocess.Popen(
-        [sys.executable, "-c", "from hdrusd.cli import main; main()", "render", stage]
-        + [frames / "f.####.exr", "--png", frames / "f.####.png", "-f", "1:200", "-w", "640"],
+        [
+            *[sys.executable, "-c", "from hdrusd.cli import main; main()", "render", stage],
+            *[frames / "f.####.exr", "--png", frames / "f.####.png", "-f", "1:200", "-w", "640"],
+        ],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -43,6 +43,13 @@ def test_reference_distance_is_where_half_is_left(
     assert attenuation(light, distance) == pytest.approx(0.5, rel=1e-14)
 
 
+def test_a_fall_that_hardly_begins_is_cut_at_a_kilometre() -> None:
+    assert reference_distance(lamp(attenuation=(1.0, 0.0, 1e-12)), 50.0) == 1000.0
+    # Half is left at 1 / k1 with a quadratic part that is lost beside it.
+    nearly_linear = lamp(attenuation=(1.0, 0.01, 1e-18))
+    assert reference_distance(nearly_linear, 50.0) == pytest.approx(100.0, rel=1e-12)
+
+
 @pytest.mark.parametrize("k", [None, (1.0, 0.0, 0.0), (2.0, 0.0, 0.0)])
 def test_without_a_fall_it_is_a_tenth_of_the_scene(k: tuple[float, float, float] | None) -> None:
     assert reference_distance(lamp(attenuation=k), 300.0) == pytest.approx(30.0, rel=1e-15)

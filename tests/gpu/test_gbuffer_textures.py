@@ -115,7 +115,7 @@ def test_negative_emission_is_dark(gl: Any) -> None:
 
 
 def test_matrix_of_the_coordinates(gl: Any) -> None:
-    """u' = a u + b v + c: a quarter turn, twice as dense, moved."""
+    """By u' = a u + b v + c: a quarter turn, twice as dense, moved."""
     matrix = (0.0, 1.0, 0.25, -0.5, 0.0, 0.5)
     made = scene(Material(emission_map=texture(matrix=matrix)))
     got = shown(gl, made)

@@ -141,13 +141,14 @@ def _judge(output: Path, case: Case) -> Iterable[str]:
 def blinn_phong_session(case: Case, output: Path) -> Path:
     """A session layer with the Blinn-Phong numbers of a case's lights.json in our attributes."""
     plain = json.loads((case.stage.parent.parent / case.entry["photometry"]).read_text("utf-8"))
+    grey = "({0}, {0}, {0})"
     overs = "".join(
         f"""
         over "{material["name"]}" (
             prepend apiSchemas = ["HdrusdPhotometricMaterialAPI"]
         )
         {{
-            uniform color3f legacy:specularColor = ({material["ks"]}, {material["ks"]}, {material["ks"]})
+            uniform color3f legacy:specularColor = {grey.format(material["ks"])}
             uniform float legacy:shininess = {material["exponent"]}
         }}
 """

@@ -9,8 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from hdrusd.schemas import API_SCHEMAS, PLUGIN_DIR, register
 from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdRender, UsdShade
+
+from hdrusd.schemas import API_SCHEMAS, PLUGIN_DIR, register
 
 register()
 

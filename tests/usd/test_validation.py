@@ -9,10 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from hdrusd.schemas import PLUGIN_DIR
 from pxr import Sdf, Tf, Usd, UsdValidation
 
 from hdrusd import validation
+from hdrusd.schemas import PLUGIN_DIR
 from hdrusd.validation import BUILT_IN, Problem, validate
 
 METRES = '(defaultPrim = "World"\n metersPerUnit = 1\n upAxis = "Z")'
