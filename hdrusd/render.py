@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -85,23 +86,34 @@ def open_stage(
     otherwise goes to standard error. Raises InputError.
     """
     paths = [_mask_path(path, name) for name in mask]
-    delegate = UsdUtils.CoalescingDiagnosticDelegate() if report is not None else None
     root, over = _layer(path), None if session is None else _layer(session)
+    layers = [root, over] if over is not None else [root]
+    with usd_warnings(path, report):
+        try:
+            if mask:
+                stage = Usd.Stage.OpenMasked(*layers, Usd.StagePopulationMask(paths))
+            else:
+                stage = Usd.Stage.Open(*layers)
+        except Tf.ErrorException as problem:
+            raise InputError(path, f"not a USD stage ({_one_line(problem)})") from problem
+    for target in paths:
+        if report is not None and not stage.GetPrimAtPath(target):
+            report.add(Kind.MISSING, "mask", SourceRef(path), str(target), "no such prim")
+    return stage
+
+
+@contextlib.contextmanager
+def usd_warnings(path: Path, report: Report | None) -> Iterator[None]:
+    """What USD warns of within the block becomes findings of the stage at ``path``."""
+    if report is None:
+        yield
+        return
+    delegate = UsdUtils.CoalescingDiagnosticDelegate()
     try:
-        if mask:
-            population = Usd.StagePopulationMask(paths)
-            stage = Usd.Stage.OpenMasked(root, *([over] if over else []), population)
-        else:
-            stage = Usd.Stage.Open(root, *([over] if over else []))
-    except Tf.ErrorException as problem:
-        raise InputError(path, f"not a USD stage ({_one_line(problem)})") from problem
-    if report is not None and delegate is not None:
+        yield
+    finally:
         for said in delegate.TakeUncoalescedDiagnostics():
             report.add(Kind.INVALID, "usd-warning", SourceRef(path), "", _warning(said.commentary))
-        for target in paths:
-            if not stage.GetPrimAtPath(target):
-                report.add(Kind.MISSING, "mask", SourceRef(path), str(target), "no such prim")
-    return stage
 
 
 def _layer(path: Path) -> Sdf.Layer:
@@ -191,14 +203,17 @@ class Renderer:
 
     def frame(self, time: float) -> Frame:
         """Render one time code (NaN: the default time). Raises InputError."""
-        try:
-            return self._frame(time)
-        except Tf.ErrorException as problem:
-            raise InputError(self.job.stage, f"frame {time:g}: {_one_line(problem)}") from problem
+        with usd_warnings(self.job.stage, self.report):
+            try:
+                return self._frame(time)
+            except Tf.ErrorException as problem:
+                text = f"frame {time:g}: {_one_line(problem)}"
+                raise InputError(self.job.stage, text) from problem
 
     def _frame(self, time: float) -> Frame:
         width, height = self.size
         camera = self.reader.camera(self.camera_path, time, width / height, self.settings.conform)
+        self._check_camera(camera)
         scene = self.reader.read(time, camera, sky_visible=self.job.sky_visible)
         texture = self.hdr.render(scene)
         statistics, ldr = None, None
@@ -206,6 +221,16 @@ class Renderer:
             parameters = self._parameters(self.display.operator, camera)
             ldr, statistics = self.display.show(texture, parameters)
         return Frame(time, self.hdr.read(), ldr, statistics, camera)
+
+    def _check_camera(self, camera: Camera) -> None:
+        """A camera that sees nothing would give black frames, silently."""
+        left, right, bottom, top = camera.window
+        numbers = (*camera.eye, *camera.right, *camera.up, *camera.window, camera.near, camera.far)
+        if not (all(map(math.isfinite, numbers)) and left < right and bottom < top):
+            raise InputError(
+                self.job.stage,
+                f"{camera.name}: sees nothing; want finite numbers, film and focal length above 0",
+            )
 
     def _parameters(self, operator: Operator, camera: Camera) -> dict[str, Any]:
         """The user's, else the stage's for this operator, else the camera's exposure."""

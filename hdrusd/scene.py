@@ -127,6 +127,7 @@ class Camera:
     orthographic: bool = False
     exposure_scale: float | None = None  # UsdGeomCamera exposure:*, where authored
     name: str = ""
+    framing: bool = False  # made by us to show a stage that has no camera
 
     def projection(self) -> Doubles:
         """(4, 4) row-vector matrix from view space (m) to OpenGL clip space."""

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from pxr import Usd, UsdGeom
 
+import hdrusd.usd  # noqa: F401 (registers the schemas before the first stage)
 from hdrusd.errors import SourceRef
 from hdrusd.images import write_png
 from hdrusd.legacy.scene import Image, LegacyScene, Light, Material, Mesh, Node, Texture
@@ -82,6 +85,19 @@ def light_row(intensity: float | tuple[float, float, float] = 1.0, **changes: An
     for name, value in changes.items():
         row[name] = value
     return row
+
+
+# A prim does not keep its stage alive.
+_STAGES: deque[Usd.Stage] = deque(maxlen=4)
+
+
+def new_stage(unit: float = 1.0, up: str = "Y") -> Usd.Stage:
+    """An empty stage in memory, one of the last four that are kept."""
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageMetersPerUnit(stage, unit)
+    UsdGeom.SetStageUpAxis(stage, up)
+    _STAGES.append(stage)
+    return stage
 
 
 # -- source files -------------------------------------------------------------------------

@@ -135,6 +135,7 @@ def framing_camera(low: np.ndarray, high: np.ndarray, up: str, aspect: float) ->
         near=radius / 100.0,
         far=radius * 10.0,
         name="(frames the stage)",
+        framing=True,
     )
 
 

@@ -125,6 +125,12 @@ class StageReader:
         for prim in plan.instancers:
             if _visible(prim, code):
                 draws.extend(self._instanced(prim, cache, code))
+        if not draws and not plan.gprims and not sky_visible:
+            raise InputError(
+                self._place(), "nothing to draw; want meshes or shapes of a purpose that is drawn"
+            )
+        if camera.framing:  # nobody chose the side from which it is seen
+            draws = [replace(draw, double_sided=True) for draw in draws]
         return RenderScene(
             lights=lights,
             draws=tuple(_merge(draws)),
@@ -226,7 +232,7 @@ class StageReader:
             prim=prim,
             key=str(shared.GetPath()),
             pieces=self._pieces(prim, code),
-            double_sided=bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get()),
+            double_sided=_double_sided(prim),
             shape_varies=time_varying(prim),
             place_varies=_place_varies(prim),
             hides=_hides(prim),
@@ -396,6 +402,12 @@ def _sky_luminance(ambient: tuple[float, float, float]) -> tuple[float, float, f
 
 def _visible(prim: Usd.Prim, code: Usd.TimeCode) -> bool:
     return bool(UsdGeom.Imageable(prim).ComputeVisibility(code) != UsdGeom.Tokens.invisible)
+
+
+def _double_sided(prim: Usd.Prim) -> bool:
+    """False only where somebody said so: usdrecord shows both sides of what says nothing."""
+    attribute = UsdGeom.Gprim(prim).GetDoubleSidedAttr()
+    return bool(attribute.Get()) if attribute.HasAuthoredValue() else True
 
 
 def _hides(prim: Usd.Prim) -> bool:

@@ -35,8 +35,7 @@ def write_mesh(stage: Usd.Stage, path: Sdf.Path, mesh: Mesh) -> Usd.Prim:
     if len(mesh.points):
         low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
         prim.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([low, high])))
-    if mesh.two_sided:
-        prim.CreateDoubleSidedAttr(True)
+    prim.CreateDoubleSidedAttr(mesh.two_sided)  # False too: it asks renderers to cull
     if mesh.left_handed:
         prim.CreateOrientationAttr(UsdGeom.Tokens.leftHanded)
     primvars = UsdGeom.PrimvarsAPI(prim)

@@ -61,10 +61,11 @@ def _round(kind: Any, radius: float, height: float, axis: str) -> Shape:
         nr = [0.0, 0.0, height / slope, height / slope]
         nz = [-1.0, -1.0, radius / slope, radius / slope]
     else:
-        angle = np.linspace(-np.pi / 2, np.pi / 2, SIDES // 2 + 2)
+        quarter = np.linspace(0.0, np.pi / 2, SIDES // 4 + 1)
+        angle = np.concatenate([-quarter[::-1], quarter])  # both halves have the full circle
         nr, nz = list(np.cos(angle)), list(np.sin(angle))
         r = [radius * c for c in nr]
-        z = [radius * s + (h if s > 0 else -h) for s in nz]
+        z = list(radius * np.sin(angle) + np.repeat([-h, h], len(quarter)))
     return _revolve(np.array(r, float), np.array(z, float), np.array(nr), np.array(nz), 1.0, axis)
 
 

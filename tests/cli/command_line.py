@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import pytest
@@ -65,6 +64,3 @@ def process(*arguments: object, **environment: str) -> Said:
         check=False,
     )
     return Said(done.returncode, done.stdout, done.stderr)
-
-
-Maker = Callable[..., CommandLine]

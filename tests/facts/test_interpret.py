@@ -15,10 +15,11 @@ from hypothesis import strategies as st
 from hdrusd.errors import SourceRef
 from hdrusd.photometry.estimate import RULES
 from hdrusd.photometry.interpret import LAMP_RADIUS, Interpreter, luminance
+from hdrusd.photometry.light import chromaticity
 from hdrusd.photometry.sidecar import Rule
 from hdrusd.report import Report
 
-RED_TEMPERATURE = (3.0, 0.5, 0.07)
+RED_TEMPERATURE, _ = chromaticity((3.0, 0.5, 0.07))
 
 
 def interpreter(**changes: Any) -> Interpreter:
