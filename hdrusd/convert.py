@@ -136,10 +136,11 @@ def _move_into_place(folder: Path, output: Path) -> None:
     except BaseException:
         for name in reversed(touched):
             target = output.parent / name
-            if not (folder / name).exists() and target.exists():
-                target.rename(folder / name)
-            if (old / name).exists():
-                (old / name).rename(target)
+            with suppress(OSError):  # the others are put back all the same
+                if not (folder / name).exists() and target.exists():
+                    target.rename(folder / name)
+                if (old / name).exists():
+                    (old / name).rename(target)
         raise
 
 

@@ -51,6 +51,7 @@ def test_stage_says_camera_and_size(gl: Any, tmp_path: Path) -> None:
     stage = write_stage(
         tmp_path / "a.usda",
         OTHER_CAMERA,
+        GROUND,
         SKY,
         SETTINGS,
         head='renderSettingsPrimPath = "/Render/Big"',
@@ -63,7 +64,7 @@ def test_stage_says_camera_and_size(gl: Any, tmp_path: Path) -> None:
 
 
 def test_settings_can_be_named(gl: Any, tmp_path: Path) -> None:
-    stage = write_stage(tmp_path / "a.usda", OTHER_CAMERA, SKY, SETTINGS)
+    stage = write_stage(tmp_path / "a.usda", OTHER_CAMERA, GROUND, SKY, SETTINGS)
     (frame,) = render(gl, stage, width=None, height=None, settings="/Render/Big")
     assert (frame.hdr.shape, frame.camera.name) == ((30, 40, 3), "/Other")
     with pytest.raises(InputError, match="/Render/None: no RenderSettings"):
@@ -72,7 +73,7 @@ def test_settings_can_be_named(gl: Any, tmp_path: Path) -> None:
 
 def test_without_settings_the_film_gives_the_shape(gl: Any, tmp_path: Path) -> None:
     """usdrecord: 960 wide, height by the camera's aspect ratio (24 : 18)."""
-    stage = write_stage(tmp_path / "a.usda", SKY)
+    stage = write_stage(tmp_path / "a.usda", GROUND, SKY)
     (frame,) = render(gl, stage, width=None, height=None)
     assert frame.hdr.shape == (720, 960, 3)
     assert frame.camera.name == "/Camera"
@@ -127,9 +128,16 @@ def test_default_sky_can_be_left_out(gl: Any, tmp_path: Path) -> None:
 
 
 def test_sky_behind_the_scene_only_on_request(gl: Any, tmp_path: Path) -> None:
-    """Nothing in view: the dome's own 10 cd/m2, or nothing."""
-    stage = write_stage(tmp_path / "a.usda", SKY)
+    """A panel out of view: the dome's own 10 cd/m2, or nothing."""
+    stage = write_stage(tmp_path / "a.usda", panel("Aside", (7, 8)), SKY)
     assert middle(gl, stage) == (0.0, 0.0, 0.0)
+    assert middle(gl, stage, sky_visible=True) == WHITE
+
+
+def test_stage_with_nothing_to_draw_is_refused(gl: Any, tmp_path: Path) -> None:
+    stage = write_stage(tmp_path / "a.usda", SKY)
+    with pytest.raises(InputError, match="nothing to draw"):
+        render(gl, stage)
     assert middle(gl, stage, sky_visible=True) == WHITE
 
 
@@ -164,6 +172,15 @@ def test_blinking_lamp_is_off_when_off(gl: Any, tmp_path: Path) -> None:
 # -- what is shown ----------------------------------------------------------------------------
 
 
+def test_back_faces_are_shown_unless_the_stage_says_otherwise(gl: Any, tmp_path: Path) -> None:
+    """As usdrecord: only an authored doubleSided = false culls."""
+    turned = panel("Panel").replace("[0, 1, 2, 3]", "[3, 2, 1, 0]")
+    for said, seen in (("", GREEN), ("1", GREEN), ("0", WHITE)):
+        line = f"    uniform bool doubleSided = {said}\n    int[] faceVertexCounts"
+        part = turned.replace("    int[] faceVertexCounts", line) if said else turned
+        assert middle(gl, write_stage(tmp_path / f"a{said}.usda", GROUND, part, SKY)) == seen
+
+
 def test_mask_opens_what_it_names(gl: Any, tmp_path: Path) -> None:
     stage = write_stage(tmp_path / "a.usda", GROUND, panel("Panel"), SKY)
     assert middle(gl, stage) == GREEN
@@ -173,7 +190,7 @@ def test_mask_opens_what_it_names(gl: Any, tmp_path: Path) -> None:
 def test_mask_that_names_nothing_is_said(gl: Any, tmp_path: Path) -> None:
     report = Report()
     stage = write_stage(tmp_path / "a.usda", GROUND, SKY)
-    render(gl, stage, report, mask=["/Sky", "/Nope"])
+    render(gl, stage, report, mask=["/Ground", "/Sky", "/Nope"])
     assert [(f.code, f.thing) for f in report] == [("mask", "/Nope")]
     for wrong in ("World", "not a path", "/A.points"):
         with pytest.raises(InputError, match="--mask"):

@@ -101,7 +101,7 @@ def test_cameras_that_see_nothing(gl: Any, tmp_path: Path, old: str, new: str) -
             marks=known_gap("_ambient does not check domes"),
         ),
     ],
-    ids="nan inf negative sky-nan sky-inf sky-negative sky-overflow".split(),
+    ids=["nan", "inf", "negative", "sky-nan", "sky-inf", "sky-negative", "sky-overflow"],
 )
 def test_lights_without_a_value(gl: Any, tmp_path: Path, light: str) -> None:
     """The schema: negative, infinite and NaN are invalid. Left out, and a finding."""
