@@ -179,12 +179,13 @@ def read_exr(path: Path) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
 
 
 def write_png(path: Path, pixels: npt.NDArray[np.uint8], comment: str = "") -> None:
-    """Write display-encoded sRGB, (h, w, 3) uint8, top row first."""
+    """Write display-encoded sRGB, (h, w, 1 to 4) uint8, top row first, alpha apart."""
     h, w, channels = pixels.shape
 
     def write(temporary: Path) -> None:
         spec = oiio.ImageSpec(w, h, channels, oiio.UINT8)
         spec.attribute("oiio:ColorSpace", "sRGB")
+        spec.attribute("oiio:UnassociatedAlpha", 1)  # else colours are divided by alpha
         spec.attribute("png:compressionLevel", 4)
         if comment:
             spec.attribute("ImageDescription", comment)

@@ -153,7 +153,6 @@ def SphereLight "Lamp"
 """
 
 
-@pytest.mark.xfail(strict=True, reason="StageReader.read decides on the sky anew in each frame")
 def test_lamp_that_blinks_brings_no_sky(gl: Any, tmp_path: Path) -> None:
     """A stage has light or has none: not in one frame so and in the next otherwise."""
     stage = write_stage(tmp_path / "a.usda", GROUND, BLINKING)
@@ -245,13 +244,7 @@ def test_animated_transforms_interpolate(gl: Any, tmp_path: Path) -> None:
     "times",
     [
         (1.0, 2.0),
-        pytest.param(
-            (-1.0, -2.0),
-            marks=pytest.mark.xfail(
-                strict=True,
-                reason="extract.py keys the shape by hash(time): hash(-1.0) == hash(-2.0)",
-            ),
-        ),
+        (-1.0, -2.0),
     ],
 )
 def test_animated_points(gl: Any, tmp_path: Path, times: tuple[float, float]) -> None:

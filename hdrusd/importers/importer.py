@@ -86,20 +86,20 @@ class Resolver:
         ]
         candidates = [base / name, *(folder / tail for folder in folders)]
         refused = False
-        for candidate in candidates:
+        for tried, candidate in enumerate(candidates):
             found = _existing(candidate)
             if found is None:
                 continue
             if not self.allowed(found):
                 refused = True
                 continue
-            if found.name != tail or found.parent != candidate.parent:
+            if tried > 0 or not candidate.exists():
                 self.report.add(
                     Kind.ASSUMED,
                     "file-found-elsewhere",
                     place,
                     thing,
-                    f"{reference}: not found as written; {found.name} is used",
+                    f"{reference}: not found as written; {found.parent.name}/{found.name} is used",
                 )
             return found
         why = (

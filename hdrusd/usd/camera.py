@@ -70,9 +70,8 @@ def read_camera(
     y = float(camera.GetVerticalApertureOffsetAttr().Get(time))
     orthographic = camera.GetProjectionAttr().Get(time) == UsdGeom.Tokens.orthographic
     # The window at distance 1; orthographic apertures are tenths of a scene unit.
-    divisor = (
-        10.0 / meters_per_unit if orthographic else float(camera.GetFocalLengthAttr().Get(time))
-    )
+    focal = float(camera.GetFocalLengthAttr().Get(time))
+    divisor = 10.0 / meters_per_unit if orthographic else focal or math.nan
     width, height = conform_aperture(width, height, aspect, conform)
     near, far = (float(v) * meters_per_unit for v in camera.GetClippingRangeAttr().Get(time))
     window = (x - width / 2, x + width / 2, y - height / 2, y + height / 2)
@@ -88,7 +87,7 @@ def read_camera(
             window[3] / divisor,
         ),
         near=max(near, 1e-4),
-        far=max(far, near * 2.0, 2e-4),
+        far=far if far > max(near, 1e-4) else max(near, 1e-4) * 1e5,  # nothing is cut off
         orthographic=bool(orthographic),
         exposure_scale=_exposure_scale(camera, time),
         name=str(prim.GetPath()),

@@ -12,33 +12,24 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.report import Kind, Report
-from hdrusd.scene import LIGHT, NO_CONE, Camera, Draw, Geometry, Material, RenderScene
+from hdrusd.scene import LIGHT, NO_CONE, Camera, Draw, Geometry, RenderScene
 from hdrusd.units import dome_luminance
+from hdrusd.usd.bindings import Bindings, Piece
 from hdrusd.usd.camera import Conform, framing_camera, read_camera
 from hdrusd.usd.instancer import instancer_draws
 from hdrusd.usd.light import light_time_varying, read_dome, read_light_row
 from hdrusd.usd.lux import is_light
 from hdrusd.usd.mesh import GeometryReader, time_varying
-from hdrusd.usd.preview import MaterialReader
 
 #: The sky and camera light of a stage that has no light of its own, lux each.
 DEFAULT_SKY = 1000.0
 
 #: Prims that usdrecord shows and shader 1 has no geometry for.
 _NOT_DRAWN = (UsdGeom.Curves, UsdGeom.Points, UsdGeom.NurbsPatch)
-
-
-@dataclass(slots=True)
-class Piece:
-    """The faces of a gprim that wear one material."""
-
-    faces: npt.NDArray[np.bool_] | None
-    material: int
-    geometry: Geometry | None = None
 
 
 @dataclass(slots=True)
@@ -94,11 +85,10 @@ class StageReader:
         self.unit = _meters_per_unit(stage, report)
         self.purposes = {"default", *purposes}
         self.default_sky = default_sky
-        self.materials: list[Material] = []
-        self._material_ids: dict[Sdf.Path | tuple[str, ...], int] = {}
-        self._material_reader = MaterialReader(stage, report)
+        self.bindings = Bindings(stage, report)
         self._plan: _Plan | None = None
         self._cameras: dict[str | None, Usd.Prim | None] = {}
+        self._reads = 0
         self._geometries: dict[tuple[str, int], Geometry | None] = {}
 
     def read(self, time: float, camera: Camera, *, sky_visible: bool = False) -> RenderScene:
@@ -108,10 +98,12 @@ class StageReader:
         if self._plan is None:
             self._plan = self._walk(code)
         plan = self._plan
+        self.bindings.update(code)
+        self._reads += 1
         rows = [row for light in plan.lights if (row := self._light(light, cache)) is not None]
         lights = np.concatenate(rows) if rows else np.zeros(0, LIGHT)
         ambient = self._ambient(code)
-        if not len(lights) and not any(ambient) and self.default_sky:
+        if self.default_sky and not self._has_light():
             lights, ambient = _default_light(camera), (DEFAULT_SKY,) * 3
             self._finding(
                 Kind.ASSUMED,
@@ -134,7 +126,7 @@ class StageReader:
         return RenderScene(
             lights=lights,
             draws=tuple(_merge(draws)),
-            materials=tuple(self.materials),
+            materials=tuple(self.bindings.materials),
             ambient=ambient,
             background=_sky_luminance(ambient) if sky_visible else (0.0, 0.0, 0.0),
             camera=camera,
@@ -231,55 +223,19 @@ class StageReader:
         return Gprim(
             prim=prim,
             key=str(shared.GetPath()),
-            pieces=self._pieces(prim, code),
+            pieces=self.bindings.pieces(prim, code),
             double_sided=_double_sided(prim),
             shape_varies=time_varying(prim),
             place_varies=_place_varies(prim),
             hides=_hides(prim),
         )
 
-    def _pieces(self, prim: Usd.Prim, code: Usd.TimeCode) -> list[Piece]:
-        """The material of each face: subsets of family materialBind, and the rest."""
-        binding = UsdShade.MaterialBindingAPI(prim)
-        subsets = list(binding.GetMaterialBindSubsets())
-        whole = Piece(None, self._material(prim, binding, code))
-        if not subsets:
-            return [whole]
-        counts = UsdGeom.Mesh(prim).GetFaceVertexCountsAttr().Get(code)
-        rest = np.ones(len(counts or []), np.bool_)
-        pieces = []
-        for subset in subsets:
-            index = np.asarray(subset.GetIndicesAttr().Get(code) or [], np.int64)
-            index = index[(index >= 0) & (index < rest.size)]
-            faces = np.zeros(rest.size, np.bool_)
-            faces[index] = True
-            rest[index] = False
-            own = UsdShade.MaterialBindingAPI(subset.GetPrim())
-            pieces.append(Piece(faces, self._material(subset.GetPrim(), own, code)))
-        if rest.any():
-            pieces.append(Piece(rest, whole.material))
-        return pieces
-
-    def _material(
-        self, prim: Usd.Prim, binding: UsdShade.MaterialBindingAPI, code: Usd.TimeCode
-    ) -> int:
-        bound, _ = binding.ComputeBoundMaterial()
-        material = None
-        key: Sdf.Path | tuple[str, ...]
-        if bound:
-            key = bound.GetPath()
-            if key not in self._material_ids:
-                material = self._material_reader.read(bound, code)
-        else:
-            color = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("displayColor")
-            shown = "displayColor" if color and color.HasValue() else ""
-            key = ("displayColor", shown)
-            white = (1.0, 1.0, 1.0)
-            material = Material(diffuse=white, vertex_color=shown) if shown else Material()
-        if key not in self._material_ids:
-            self._material_ids[key] = len(self.materials)
-            self.materials.append(material or Material())
-        return self._material_ids[key]
+    def _has_light(self) -> bool:
+        """Whether the stage has any light at all, lit in this frame or not."""
+        assert self._plan is not None
+        root = self.stage.GetDefaultPrim()
+        ambient = bool(root) and root.HasAPI("HdrusdAmbientAPI")
+        return bool(self._plan.lights or self._plan.domes or ambient)
 
     # -- one frame -----------------------------------------------------------------------
 
@@ -289,8 +245,10 @@ class StageReader:
         if light.row is None or light.varies:
             world = cache.GetLocalToWorldTransform(light.prim)
             row = read_light_row(light.prim, cache.GetTime(), world, self.unit, self.report)
-            if row is None or not all(np.isfinite(row[name]).all() for name in LIGHT.fields or ()):
-                self._finding(Kind.INVALID, "light-invalid", "not finite; left out", light.prim)
+            if row is None or not _sound(row):
+                self._finding(
+                    Kind.INVALID, "light-invalid", "not finite or negative; left out", light.prim
+                )
                 return None
             light.row = row
         return light.row
@@ -303,12 +261,19 @@ class StageReader:
         if root and root.HasAPI("HdrusdAmbientAPI"):
             lux = root.GetAttribute("photometric:ambient:illuminance").Get(code)
             color = root.GetAttribute("photometric:ambient:color").Get(code)
-            if lux is not None:
-                total += lux * np.asarray(color if color is not None else (1, 1, 1))
+            sky = np.asarray(color if color is not None else (1, 1, 1)) * float(lux or 0.0)
+            if lux is not None and np.isfinite(sky).all() and (sky >= 0.0).all():
+                total += sky
                 spoken_for.update(root.GetRelationship("photometric:ambient:light").GetTargets())
         for prim in self._plan.domes if self._plan else []:
             if prim.GetPath() not in spoken_for and _visible(prim, code):
-                total += read_dome(prim, code, self.report) or (0.0, 0.0, 0.0)
+                lux = np.asarray(read_dome(prim, code, self.report) or (0.0, 0.0, 0.0))
+                if np.isfinite(lux).all() and (lux >= 0.0).all():
+                    total += lux
+                else:
+                    self._finding(
+                        Kind.INVALID, "light-invalid", "not finite or negative; left out", prim
+                    )
         r, g, b = (float(v) for v in total)
         return r, g, b
 
@@ -323,12 +288,12 @@ class StageReader:
                 yield Draw(piece.geometry, piece.material, gprim.matrix, gprim.double_sided)
 
     def _read_geometry(self, gprim: Gprim, code: Usd.TimeCode) -> None:
-        version = hash(code.GetValue()) if gprim.shape_varies else 0
+        version = self._reads if gprim.shape_varies else 0
         reader: GeometryReader | None = None
         for index, piece in enumerate(gprim.pieces):
             if piece.geometry is not None and piece.geometry.version == version:
                 continue
-            material = self.materials[piece.material]
+            material = self.bindings.materials[piece.material]
             key = f"{gprim.key}#{index}:{material.vertex_color}:{','.join(material.uv_sets())}"
             known = self._geometries.get((key, version))
             if known is None and (key, version) not in self._geometries:
@@ -402,6 +367,12 @@ def _sky_luminance(ambient: tuple[float, float, float]) -> tuple[float, float, f
 
 def _visible(prim: Usd.Prim, code: Usd.TimeCode) -> bool:
     return bool(UsdGeom.Imageable(prim).ComputeVisibility(code) != UsdGeom.Tokens.invisible)
+
+
+def _sound(row: npt.NDArray[np.void]) -> bool:
+    """Whether a light's numbers are numbers, and give light rather than take it."""
+    finite = all(np.isfinite(row[name]).all() for name in LIGHT.fields or ())
+    return finite and bool((row["intensity"] >= 0.0).all())
 
 
 def _double_sided(prim: Usd.Prim) -> bool:

@@ -44,6 +44,14 @@ def instancer_draws(
     for number, target in enumerate(instancer.GetPrototypesRel().GetForwardedTargets()):
         copies = transforms[(indices == number) & shown]
         root = prim.GetStage().GetPrimAtPath(target)
+        if not root:
+            report.add(
+                Kind.MISSING,
+                "instancer-prototype",
+                place,
+                str(prim.GetPath()),
+                f"prototype {target} is not there",
+            )
         if not root or not len(copies):
             continue
         for source in Usd.PrimRange(root, Usd.TraverseInstanceProxies()):
@@ -56,7 +64,11 @@ def instancer_draws(
                     str(source.GetPath()),
                     f"{source.GetTypeName()} inside a PointInstancer is not shown",
                 )
-            elif source.IsA(UsdGeom.Gprim) and imageable.ComputePurpose() in purposes:
+            elif (
+                source.IsA(UsdGeom.Gprim)
+                and imageable.ComputePurpose() in purposes
+                and imageable.ComputeVisibility(time) != UsdGeom.Tokens.invisible
+            ):
                 # IncludeProtoXform has put the root's own transform into the copies.
                 inside, _ = cache.ComputeRelativeTransform(source, root)
                 yield source, np.array(inside, np.float64) @ copies

@@ -177,7 +177,8 @@ def _photometric(
     """Strength (cd or lx) and colour of luminance 1: the photometric value, else the plain one."""
     rgb = np.asarray(reading.intensity, np.float64)
     luminance = float(rgb @ LUMINANCE_WEIGHTS)
-    color = rgb / luminance if luminance > 0.0 else np.ones(3)
+    usable = luminance > 0.0 and math.isfinite(luminance)
+    color = rgb / luminance if usable else np.ones(3)
     name = _ILLUMINANCE if reading.kind in ("distant", "dome") else _INTENSITY
     attribute = input_source(prim, name.removeprefix("inputs:"))
     if attribute and attribute.HasAuthoredValue():

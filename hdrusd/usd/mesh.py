@@ -171,7 +171,7 @@ class GeometryReader:
         uvs = {name: values for name in uv_sets if (values := self._uv(tri, name)) is not None}
         colors = {}
         if color and (values := self._primvar(tri, color, 3)) is not None:
-            colors[color] = values
+            colors[color] = self._reflecting(values, color)
         return Geometry(
             key=key,
             version=version,
@@ -180,6 +180,13 @@ class GeometryReader:
             uvs=uvs,
             colors=colors,
         )
+
+    def _reflecting(self, values: Floats, name: str) -> Floats:
+        """Vertex colours as factors on a reflectance: finite and not negative."""
+        if np.isfinite(values).all() and (values >= 0.0).all():
+            return values
+        self._finding(Kind.INVALID, "color-invalid", f"{name} is not finite or negative; 0 there")
+        return np.maximum(np.nan_to_num(values, posinf=0.0, neginf=0.0), 0.0)
 
     def _uv(self, tri: Corners, name: str) -> Floats | None:
         values = self._primvar(tri, name, 2)

@@ -120,6 +120,12 @@ def uniform_scale(world: Gf.Matrix4d) -> tuple[float, bool]:
     return mean, bool(mean > 0.0 and values[0] - values[-1] <= 1e-6 * values[0])
 
 
+def is_flat(world: Gf.Matrix4d) -> bool:
+    """Whether a matrix squeezes space into a plane, a line or a point, but for rounding."""
+    values = np.linalg.svd(np.array(world, np.float64)[:3, :3], compute_uv=False)
+    return bool(values[-1] <= 1e-12 * values[0])
+
+
 def rigid(world: Gf.Matrix4d) -> Gf.Matrix4d:
     """The matrix without scale and shear: where a thing is and which way it looks.
 

@@ -24,7 +24,7 @@ from hdrusd.usd.light import write_legacy_falloff, write_light
 from hdrusd.usd.material import bind, bind_faces, keep_extras
 from hdrusd.usd.mesh import write_mesh
 from hdrusd.usd.settings import Settings, write_settings
-from hdrusd.usd.transform import aim, rigid, uniform_scale, write_transform
+from hdrusd.usd.transform import aim, is_flat, rigid, uniform_scale, write_transform
 
 #: Frame rate of the stages that we write; legacy animation is in seconds.
 CODES_PER_SECOND = 24.0
@@ -277,8 +277,11 @@ class StageWriter:
                 local.SetRotateOnly(turn)
             local.SetTranslateOnly(Gf.Vec3d(*source.position))
             goal = rigid(local * world)
-            if world.GetDeterminant() != 0.0:
-                form.AddTransformOp().Set(goal * world.GetInverse())
+            if not is_flat(world):
+                goal *= world.GetInverse()
+            else:  # a space without volume cannot be undone, only left
+                form.SetResetXformStack(True)
+            form.AddTransformOp().Set(goal)
             return
         if any(source.position):
             form.AddTranslateOp().Set(Gf.Vec3d(*source.position))

@@ -1,0 +1,121 @@
+"""The door through which readers open files: roots, search, refusals."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from hdrusd.errors import InputError, SourceRef
+from hdrusd.importers.importer import Limits, Resolver, read
+from hdrusd.report import Report
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Path:
+    """``model/meshes/car.obj`` with textures beside the folder of the meshes, as Gazebo has it."""
+    (tmp_path / "model" / "meshes").mkdir(parents=True)
+    textures = tmp_path / "model" / "materials" / "textures"
+    textures.mkdir(parents=True)
+    (textures / "Paint.png").write_bytes(b"paint")
+    (tmp_path / "secret.png").write_bytes(b"secret")
+    source = tmp_path / "model" / "meshes" / "car.obj"
+    source.write_bytes(b"v 0 0 0\n")
+    return source
+
+
+def find(resolver: Resolver, reference: str) -> Path | None:
+    """The file that a reference in the source names."""
+    return resolver.find(reference, SourceRef(resolver.source, 1))
+
+
+def test_a_folder_beside_needs_a_root(model: Path) -> None:
+    report = Report()
+    assert find(Resolver(model, report), "Paint.png") is None
+    assert report.codes() == {"file-refused"}
+    found = find(Resolver(model, report, roots=[model.parents[1]]), "Paint.png")
+    assert found is not None
+    assert found.read_bytes() == b"paint"
+
+
+@pytest.mark.parametrize(
+    "name", ["paint.PNG", "C:\\maps\\Paint.png", "Paint.png  ", "gone/Paint.png"]
+)
+def test_a_name_is_mended_and_that_is_told(model: Path, name: str) -> None:
+    report = Report()
+    found = find(Resolver(model, report, roots=[model.parents[1]]), name)
+    assert found is not None
+    assert found.name == "Paint.png"
+    assert report.codes() == {"file-found-elsewhere"}
+
+
+@pytest.mark.parametrize("name", ["../../secret.png", "{outside}", "link.png", "/dev/zero"])
+def test_nothing_outside_the_roots_is_named(model: Path, name: str) -> None:
+    outside = model.parents[2] / "secret.png"
+    (model.parent / "link.png").symlink_to(outside)
+    report = Report()
+    resolver = Resolver(model, report, roots=[model.parents[1]])
+    assert find(resolver, name.format(outside=outside)) is None
+    assert report.codes() == {"file-refused"}
+
+
+@pytest.mark.parametrize(
+    "name", ["", "  ", "a\0b", "x" * 5000 + ".png", "loop.png", "LOOP.png", "."]
+)
+def test_a_name_that_is_none_is_missing(model: Path, name: str) -> None:
+    (model.parent / "loop.png").symlink_to("loop.png")
+    report = Report()
+    assert find(Resolver(model, report), name) is None
+    assert report.codes() <= {"file-missing", "file-refused"}
+    assert len(report) == 1
+
+
+def test_a_file_that_lies_as_written_needs_no_word(model: Path) -> None:
+    (model.parent / "Paint.png").write_bytes(b"beside")
+    (model.parent / "link.png").symlink_to("Paint.png")
+    report = Report()
+    resolver = Resolver(model, report)
+    for name in ("Paint.png", "./Paint.png", "..\\meshes\\Paint.png", "link.png"):
+        found = find(resolver, name)
+        assert found is not None
+        assert found.read_bytes() == b"beside"
+    assert len(report) == 0
+
+
+def test_a_pipe_and_a_folder_are_not_read(model: Path) -> None:
+    resolver = Resolver(model, Report())
+    pipe = model.parent / "pipe.obj"
+    os.mkfifo(pipe)
+    for path in (pipe, model.parent):
+        with pytest.raises(InputError, match="not a regular file"):
+            resolver.read(path)
+
+
+def test_a_file_that_is_not_there_or_too_big_is_an_input_error(model: Path) -> None:
+    resolver = Resolver(model, Report(), limits=Limits(file_bytes=7))
+    with pytest.raises(InputError, match="no such file"):
+        resolver.read(model.parent / "gone.obj")
+    with pytest.raises(InputError, match="8 bytes; at most 7"):
+        resolver.read()
+
+
+@pytest.mark.parametrize("call", ["exists", "read_bytes"])
+def test_a_file_that_may_not_be_read_is_an_input_error(
+    model: Path, monkeypatch: pytest.MonkeyPatch, call: str
+) -> None:
+    def refuse(self: Path) -> None:
+        raise PermissionError(13, "Permission denied", str(self))
+
+    resolver = Resolver(model, Report())
+    monkeypatch.setattr(Path, call, refuse)  # permissions do not bind every user that runs tests
+    with pytest.raises(InputError, match=r"car\.obj: cannot be read: Permission denied") as caught:
+        resolver.read()
+    assert caught.value.exit_code == 3
+
+
+def test_a_suffix_without_a_reader_is_an_input_error(model: Path) -> None:
+    other = model.with_suffix(".blend")
+    other.write_bytes(b"")
+    with pytest.raises(InputError, match=r"\.blend: no reader; want .*\.gltf"):
+        read(Resolver(other, Report()), Report())
