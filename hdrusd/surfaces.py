@@ -129,6 +129,9 @@ class SurfaceMaker:
         if material.pbr is None and total > 1.0 + 1e-6:
             text = f"diffuse and specular add up to {total:.3g}; more than falls in"
             self._note(material, Kind.ASSUMED, "energy", text)
+        if any(specular) and material.pbr is not None and "glossiness" not in material.pbr:
+            text = "specular colour beside metallic and roughness, which say the highlight"
+            self._note(material, Kind.DROPPED, "specular-unused", text)
         if not material.lit:
             text = "lighting is off in the source; lit here, for it says no cd/m2"
             self._note(material, Kind.ASSUMED, "lighting-off", text)

@@ -264,3 +264,18 @@ def test_the_report_has_every_finding_and_every_light(tmp_path: Path) -> None:
     assert point["value"] == pytest.approx(820.86)
     assert (moon["unit"], moon["source_value"]["lux"]) == ("lx", 0.25)
     assert Sdf.Path(point["path"]).IsAbsolutePath()
+
+
+def test_an_ambient_light_yields_to_the_photometry_file(tmp_path: Path) -> None:
+    source = osgt_light(
+        tmp_path / "lamp.osgt",
+        {"Ambient": "0.5 0.5 0.5 1", "Diffuse": "0 0 0 1", "Specular": "0 0 0 1"},
+    )
+    guessed = run(source)
+    assert guessed.lights[0]["value"] == pytest.approx(10.0)  # half of 20 lx
+    assert "ambient-estimate" in guessed.report.codes()
+    sidecar(tmp_path, "[ambient]\nilluminance = 0.3\n")
+    stated = run(source)
+    assert [row["value"] for row in stated.lights] == [pytest.approx(0.3)]
+    assert "ambient-estimate" not in stated.report.codes()
+    assert "ambient-replaced" in stated.report.codes()

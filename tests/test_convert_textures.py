@@ -233,3 +233,36 @@ def test_a_missing_picture_leaves_the_colour(tmp_path: Path) -> None:
         shader = surface(opened(result))
         assert texture_node(shader, "diffuseColor") is None
         assert shader.GetInput("diffuseColor").Get() == Gf.Vec3f(0.5)
+
+
+@pytest.mark.parametrize(
+    ("mtl", "code"),
+    [
+        ("Kd 0.5 0.5 0.5\nillum 0", "lighting-off"),
+        ("Kd 0.9 0.9 0.9\nKs 0.5 0.5 0.5", "energy"),
+        ("Kd 0.5 0.5 0.5\nKs 0.2 0.2 0.2\nPm 0.5", "specular-unused"),
+    ],
+)
+def test_what_a_material_says_beyond_reflectance_is_a_finding(
+    tmp_path: Path, mtl: str, code: str
+) -> None:
+    result = run(obj(tmp_path / "wall.obj", mtl))
+    (finding,) = [finding for finding in result.report if finding.code == code]
+    assert (finding.thing, finding.source.file.name) == ("paint", "wall.mtl")
+
+
+def test_a_lamp_needs_no_word_about_its_reflection(tmp_path: Path) -> None:
+    sidecar(tmp_path, '[[material]]\nmatch = "paint"\nluminance = 5\n')
+    result = run(obj(tmp_path / "wall.obj", "Kd 0.9 0.9 0.9\nKs 1 1 1\nillum 0"))
+    assert not result.report.codes() & {"energy", "lighting-off"}
+
+
+def test_pictures_of_no_portable_format_are_kept_as_png_with_their_alpha(tmp_path: Path) -> None:
+    # An uncompressed TGA of 32 bits, top row first: blue, green, red, alpha.
+    header = bytes([0, 0, 2, *[0] * 9, 2, 0, 1, 0, 32, 0x28])
+    (tmp_path / "leaf.tga").write_bytes(header + bytes([30, 20, 10, 51, 60, 50, 40, 255]))
+    result = run(obj(tmp_path / "wall.obj", "Kd 1 1 1\nmap_Kd leaf.tga"))
+    (name,) = [name for name, made in result.textures.items() if made["kind"] == "look"]
+    assert name.endswith(".png")
+    pixels = read_image(result.output.parent / "wall.textures" / name).pixels
+    assert pixels.tolist() == [[[10, 20, 30, 51], [40, 50, 60, 255]]]

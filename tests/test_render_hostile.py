@@ -72,7 +72,7 @@ def render(gl: Any, tmp_path: Path, *parts: str, **options: Any) -> tuple[list[F
     ],
 )
 def test_cameras_that_see_nothing(gl: Any, tmp_path: Path, old: str, new: str) -> None:
-    with pytest.raises(InputError, match="/Camera: sees nothing"):
+    with pytest.raises(InputError, match="/Camera: "):
         render(gl, tmp_path, GROUND, SKY, camera=CAMERA.replace(old, new))
 
 

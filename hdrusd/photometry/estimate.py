@@ -55,7 +55,8 @@ def reference_distance(light: Light, diagonal: float) -> float:
     c = k0 - wanted
     if k2 > 0.0:
         # 2 c / (-b - root): the other form cancels where k2 is small, and divides by it.
-        distance = -2.0 * c / (k1 + math.sqrt(max(k1 * k1 - 4.0 * k2 * c, 0.0)))
+        steep = k1 + math.sqrt(max(k1 * k1 - 4.0 * k2 * c, 0.0))
+        distance = -2.0 * c / steep if steep > 0.0 else MAX_REFERENCE_DISTANCE
     elif k1 > 0.0:
         distance = -c / k1
     else:

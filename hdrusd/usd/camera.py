@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom
 
+from hdrusd.errors import InputError
 from hdrusd.legacy import scene as legacy
 from hdrusd.scene import Camera
 
@@ -59,7 +61,7 @@ def read_camera(
     """The camera at ``time``. ``aspect``: image width / height, to which the window is conformed.
 
     ``world``: the prim's local to world matrix in scene units; its scale is
-    ignored, as UsdGeomCamera says.
+    ignored, as UsdGeomCamera says. Raises InputError where no picture can be made.
     """
     camera = UsdGeom.Camera(prim)
     rotation = np.array(world.ExtractRotationMatrix().GetOrthonormalized(), np.float64)
@@ -72,8 +74,19 @@ def read_camera(
     # The window at distance 1; orthographic apertures are tenths of a scene unit.
     focal = float(camera.GetFocalLengthAttr().Get(time))
     divisor = 10.0 / meters_per_unit if orthographic else focal or math.nan
-    width, height = conform_aperture(width, height, aspect, conform)
     near, far = (float(v) * meters_per_unit for v in camera.GetClippingRangeAttr().Get(time))
+    if not (min(width, height, divisor) > 0.0 and math.isfinite(width + height + x + y + divisor)):
+        raise InputError(
+            Path(prim.GetStage().GetRootLayer().identifier),
+            f"{prim.GetPath()}: aperture {width:g} x {height:g}, focal length {divisor:g}; "
+            "want finite numbers above 0",
+        )
+    if not math.isfinite(near + far + eye.sum() + rotation.sum()):
+        raise InputError(
+            Path(prim.GetStage().GetRootLayer().identifier),
+            f"{prim.GetPath()}: place or clipping range is not finite",
+        )
+    width, height = conform_aperture(width, height, aspect, conform)
     window = (x - width / 2, x + width / 2, y - height / 2, y + height / 2)
     return Camera(
         eye=_vec(eye),

@@ -51,7 +51,9 @@ class Names:
     def child(self, parent: Sdf.Path, wanted: str) -> Sdf.Path:
         """A free path below ``parent`` for a name from the source."""
         names = self.taken.setdefault(parent, set())
-        base = Tf.MakeValidIdentifier(wanted.strip()[:120] or "unnamed")
+        wanted = wanted.strip()[:120] or "unnamed"
+        # A digit in front would be replaced, and "1st" and "2nd" be told apart no more.
+        base = Tf.MakeValidIdentifier(f"_{wanted}" if wanted[0].isdigit() else wanted)
         name, number = base, 1
         while name in names:
             number += 1

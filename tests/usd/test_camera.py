@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pxr import Gf, Sdf, Usd, UsdGeom
 
+from hdrusd.errors import InputError
 from hdrusd.legacy import scene as legacy
 from hdrusd.usd.camera import conform_aperture, framing_camera, read_camera, write_camera
 
@@ -112,6 +113,24 @@ def test_an_animated_lens_is_read_at_its_time() -> None:
         prim.GetPrim(), Usd.TimeCode(1.0), Gf.Matrix4d(1), meters_per_unit=1.0, aspect=1.5
     )
     assert back.window[3] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("focalLength", 0.0),
+        ("focalLength", math.nan),
+        ("horizontalAperture", 0.0),
+        ("verticalAperture", -1.0),
+        ("verticalApertureOffset", math.inf),
+        ("clippingRange", Gf.Vec2f(math.nan, 1.0)),
+    ],
+)
+def test_a_lens_that_makes_no_picture_is_one_line(name: str, value: Any) -> None:
+    prim = UsdGeom.Camera.Define(new_stage(), "/Camera")
+    prim.GetPrim().GetAttribute(name).Set(value)
+    with pytest.raises(InputError, match="/Camera: "):
+        read(prim)
 
 
 @pytest.mark.parametrize("up", ["Y", "Z"])
