@@ -11,7 +11,7 @@ import click
 
 from hdrusd.errors import ValidationError
 
-from .options import FILE, STRICT
+from .options import FILE, STRICT, tell
 
 
 @click.command("check")
@@ -21,14 +21,17 @@ from .options import FILE, STRICT
 def command(stage: Path, as_json: bool, strict: bool) -> None:
     """Validate STAGE: units, light intensities, reflectances, sky."""
     from hdrusd.render import open_stage
+    from hdrusd.report import Report
     from hdrusd.validation import validate
 
-    problems = validate(open_stage(stage))
+    report = Report()
+    problems = validate(open_stage(stage, report=report))
     if as_json:
         click.echo(json.dumps([asdict(problem) for problem in problems]))
     else:
         for problem in problems:
             click.echo(f"{stage.name}: {problem.severity}: {problem}")
+        tell(report, quiet=False)
     errors = sum(problem.severity == "error" for problem in problems)
     if not as_json:
         click.echo(f"{stage.name}: {errors} errors, {len(problems) - errors} warnings", err=True)

@@ -53,12 +53,12 @@ def _stage(file: Path) -> dict[str, Any]:
     from hdrusd.usd.settings import read_settings
 
     report = Report()
-    stage = open_stage(file)
+    stage = open_stage(file, report=report)
     reader = StageReader(stage, report, default_sky=False)
     settings = read_settings(stage)
     time = stage.GetStartTimeCode()
     camera = reader.camera(settings.camera, time, 16 / 9)
-    scene = reader.read(time, camera)
+    scene = reader.read(time, camera, sky_visible=True)  # lights alone are worth telling too
     return {
         "metersPerUnit": reader.unit,
         "frames": f"{stage.GetStartTimeCode():g} to {stage.GetEndTimeCode():g}, "

@@ -11,10 +11,13 @@ from pxr import Gf, Sdf, Usd, UsdGeom
 
 from hdrusd.errors import InputError
 from hdrusd.legacy import scene as legacy
-from hdrusd.scene import Camera
+from hdrusd.scene import Camera, Doubles
 
 #: Width of the film that we write, in tenths of a scene unit (36 mm in a metre stage: 0.36).
 _FILM_WIDTH = 36.0
+
+#: Surplus of surface to one side of an axis that decides on which side a framing camera stands.
+_CLEAR = 0.1
 
 Conform = Literal[
     "expandAperture",
@@ -123,15 +126,21 @@ def conform_aperture(
     return (width, width / aspect) if fit_width else (height * aspect, height)
 
 
-def framing_camera(low: np.ndarray, high: np.ndarray, up: str, aspect: float) -> Camera:
+def framing_camera(
+    low: Doubles, high: Doubles, up: str, aspect: float, front: Doubles | None = None
+) -> Camera:
     """A camera that sees a whole box (m), for stages without one, as usdrecord makes one.
 
     60 degrees wide or high, whichever is less, from the front and somewhat above.
+    ``front``: where the surfaces face, 0 to 1 long (``facing``); along an axis where that is
+    clear the camera stands on their side, so that a sheet is not seen from its dark back.
     """
     centre = (low + high) / 2
     radius = max(float(np.linalg.norm(high - low)) / 2, 1e-3)
     half = math.tan(math.radians(30.0))
     direction = np.array([0.45, 0.35, 1.0]) if up == "Y" else np.array([0.45, -1.0, 0.35])
+    if front is not None:
+        direction = np.where(np.abs(front) > _CLEAR, np.copysign(direction, front), direction)
     back = direction / np.linalg.norm(direction)
     vertical = np.array([0.0, 1.0, 0.0] if up == "Y" else [0.0, 0.0, 1.0])
     right = np.cross(vertical, back)

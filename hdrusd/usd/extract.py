@@ -6,7 +6,7 @@ again for what may have changed: matrices, visibility, points, light inputs.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from hdrusd.scene import LIGHT, NO_CONE, Camera, Draw, Geometry, RenderScene
 from hdrusd.units import dome_luminance
 from hdrusd.usd.bindings import Bindings, Piece
 from hdrusd.usd.camera import Conform, framing_camera, read_camera
+from hdrusd.usd.facing import facing
 from hdrusd.usd.instancer import instancer_draws
 from hdrusd.usd.light import light_time_varying, read_dome, read_light_row
 from hdrusd.usd.lux import is_light
@@ -95,9 +96,7 @@ class StageReader:
         """Everything at a time code, in world metres. ``sky_visible``: seen behind the scene."""
         code = Usd.TimeCode(time)
         cache = UsdGeom.XformCache(code)
-        if self._plan is None:
-            self._plan = self._walk(code)
-        plan = self._plan
+        plan = self._planned(code)
         self.bindings.update(code)
         self._reads += 1
         rows = [row for light in plan.lights if (row := self._light(light, cache)) is not None]
@@ -111,12 +110,7 @@ class StageReader:
                 f"no light: shown under {DEFAULT_SKY:g} lx of sky "
                 f"and {DEFAULT_SKY:g} lx from the camera; --disableCameraLight leaves it dark",
             )
-        draws: list[Draw] = []
-        for gprim in plan.gprims:
-            draws.extend(self._draws(gprim, cache, code))
-        for prim in plan.instancers:
-            if _visible(prim, code):
-                draws.extend(self._instanced(prim, cache, code))
+        draws = list(self._all_draws(cache, code))
         if not draws and not plan.gprims and not sky_visible:
             raise InputError(
                 self._place(), "nothing to draw; want meshes or shapes of a purpose that is drawn"
@@ -146,7 +140,8 @@ class StageReader:
                 return Camera()
             low, high = np.array(bounds.GetMin()), np.array(bounds.GetMax())
             up = str(UsdGeom.GetStageUpAxis(self.stage))
-            return framing_camera(low * self.unit, high * self.unit, up, aspect)
+            front = facing(self._all_draws(UsdGeom.XformCache(code), code))
+            return framing_camera(low * self.unit, high * self.unit, up, aspect, front)
         world = UsdGeom.XformCache(code).GetLocalToWorldTransform(prim)
         return read_camera(
             prim, code, world, meters_per_unit=self.unit, aspect=aspect, conform=conform
@@ -175,6 +170,11 @@ class StageReader:
         raise InputError(self._place(), f"{path}: no such camera; the stage has {known}")
 
     # -- walking the stage ---------------------------------------------------------------
+
+    def _planned(self, code: Usd.TimeCode) -> _Plan:
+        if self._plan is None:
+            self._plan = self._walk(code)
+        return self._plan
 
     def _walk(self, code: Usd.TimeCode) -> _Plan:
         plan = _Plan()
@@ -276,6 +276,14 @@ class StageReader:
                     )
         r, g, b = (float(v) for v in total)
         return r, g, b
+
+    def _all_draws(self, cache: UsdGeom.XformCache, code: Usd.TimeCode) -> Iterator[Draw]:
+        plan = self._planned(code)
+        for gprim in plan.gprims:
+            yield from self._draws(gprim, cache, code)
+        for prim in plan.instancers:
+            if _visible(prim, code):
+                yield from self._instanced(prim, cache, code)
 
     def _draws(self, gprim: Gprim, cache: UsdGeom.XformCache, code: Usd.TimeCode) -> Iterable[Draw]:
         if gprim.hides and not _visible(gprim.prim, code):
