@@ -7,6 +7,8 @@ from pathlib import Path
 
 import click
 
+from hdrusd.errors import HdrusdError
+
 from .options import FILE, FOLDER, finish, report_options, tell, write_report
 
 
@@ -90,7 +92,13 @@ def command(
         roots=roots,
         search=search,
     )
-    result = convert(source, output, options, report)
+    try:
+        result = convert(source, output, options, report)
+    except HdrusdError:
+        tell(report, quiet)  # what led to it
+        if report_file is not None:
+            write_report(report_file, report.as_dict())
+        raise
     document = result.as_dict()
     if report_file is not None:
         write_report(report_file, document)

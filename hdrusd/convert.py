@@ -66,7 +66,7 @@ class Result:
     textures: dict[str, dict[str, object]] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON form: docs/report.md."""
+        """JSON form: docs/findings.md."""
         return self.report.as_dict() | {
             "output": str(self.output),
             "counts": self.counts,
@@ -184,6 +184,8 @@ class _Conversion:
         )
         self._write_materials()
         self._write_lights()
+        if not self.scene.meshes and not self.result.lights and not self.scene.cameras:
+            raise InputError(self.scene.source, "nothing in it that can be used; see the findings")
         camera = self._write_cameras()
         self._show_nodes()
         self.writer.write_settings(

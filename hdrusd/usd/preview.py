@@ -60,10 +60,10 @@ class MaterialReader:
         opacity = self._number(prim, surface, "opacity", 1.0)
         threshold = self._number(prim, surface, "opacityThreshold", 0.0)
         if threshold <= 0.0 and (opacity < 1.0 or opacity_map is not None):
-            threshold = 0.5
-            self._finding(
-                prim, "alpha-blend", "blending is drawn as a cut-out at opacity 0.5", Kind.REPLACED
-            )
+            lens = opacity_map is None and (emission_map is not None or any(emission))
+            threshold = 0.0 if lens else 0.5  # a lamp behind its glass must not be cut away
+            how = "solid, for it glows" if lens else "as a cut-out at opacity 0.5"
+            self._finding(prim, "alpha-blend", f"blending is drawn {how}", Kind.REPLACED)
         specular, metallic = self._specular(prim, surface)
         roughness = self._factor(prim, surface, "roughness", 0.5)
         shininess = shininess_from_roughness(roughness)

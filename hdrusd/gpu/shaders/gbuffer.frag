@@ -83,5 +83,6 @@ void main()
     g_normal = vec4(n, depth);
     g_diffuse = vec4(rho, shininess);
     g_specular = vec4(ks, alpha);
-    hdr = vec4(max(glow, 0.0) + lambert(rho, ambient, lambert_scale), 1.0);
+    // What comes from everywhere alike is mirrored by a metal as a diffuse surface scatters it.
+    hdr = vec4(max(glow, 0.0) + lambert(base, ambient, lambert_scale), 1.0);
 }
