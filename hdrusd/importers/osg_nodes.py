@@ -186,8 +186,9 @@ class NodeReader:
     def _lod(self, made: Description) -> None:
         document, place, count = self.document, made.place, len(made.children)
         files = self._files(made) if place.class_name == "PagedLOD" else []
-        if document.word(place, "rangemode") == "PIXEL_SIZE_ON_SCREEN":
-            text = "ranges are sizes on the screen in pixels, not distances"
+        pixels = document.word(place, "rangemode") == "PIXEL_SIZE_ON_SCREEN"
+        if pixels:
+            text = "ranges are sizes on the screen in pixels; their inverse stands for a distance"
             self._add(Kind.ASSUMED, "osg-lod-pixels", made, text)
         numbers = self._numbers(place, "rangelist")
         if document.field(place, "rangelist") is None:  # before 2002: the limits between levels
@@ -205,7 +206,10 @@ class NodeReader:
             self._add(Kind.INVALID, "osg-lod-ranges", made, text)
         ranges = [_ALWAYS] * count
         for number in np.flatnonzero(usable).tolist():
-            ranges[number] = float(pairs[number, 0]), float(pairs[number, 1])
+            near, far = float(pairs[number, 0]), float(pairs[number, 1])
+            if pixels:  # many pixels are near
+                near, far = 1.0 / max(far, 1e-9), 1.0 / max(near, 1e-9)
+            ranges[number] = near, far
         made.kind, made.lod_ranges = "lod", tuple(ranges)
 
     def _switch(self, made: Description) -> None:

@@ -121,10 +121,11 @@ def test_fewer_children_than_declared(tmp_path: Path) -> None:
 
 
 def test_level_of_detail(tmp_path: Path) -> None:
-    children = (group(fields='Name "near" '), group(fields='Name "far" '))
+    children = (group(fields='Name "far" '), group(fields='Name "near" '))
     fields = "RangeMode PIXEL_SIZE_ON_SCREEN \nRangeList 2 {\n0 100 \n100 2000 \n}"
     made = load(tmp_path, HEADER + group(*children, kind="osg::LOD", fields=fields))
-    assert (made.root.kind, made.root.lod_ranges) == ("lod", ((0, 100), (100, 2000)))
+    # Sizes on the screen fall as distances rise: the child of 100 pixels and more is the near one.
+    assert (made.root.kind, made.root.lod_ranges) == ("lod", ((1 / 100, 1e9), (1 / 2000, 1 / 100)))
     assert made.codes() == {"osg-lod-pixels"}
     # Before October 2002 the limits between the levels were listed.
     old = old_group(old_group(), old_group(), kind="LOD", fields="Ranges 3 {\n0\n100\n2000\n}")
