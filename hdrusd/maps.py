@@ -14,6 +14,7 @@ import re
 from collections import OrderedDict
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -79,8 +80,12 @@ class MapWriter:
             return None
         name = _name(texture.image, "R", f"{key}|{gamma!r}|{diffuse!r}")
         if name not in self.written:
-            color = linear(picture, gamma) * np.asarray(diffuse)
-            wrong = ((color > 1.0) | (color < 0.0)).any(axis=-1)
+            if picture.pixels.dtype == np.uint8 and min(diffuse) >= 0.0 and max(diffuse) <= 1.0:
+                color: npt.NDArray[Any] = _coded(picture.pixels, gamma, diffuse)
+                wrong: npt.NDArray[Any] = np.zeros(1, np.bool_)  # T and D are at most 1, so is R
+            else:
+                color = linear(picture, gamma) * np.asarray(diffuse)
+                wrong = np.any((color > 1.0) | (color < 0.0), axis=-1)
             if wrong.any():
                 self.report.add(
                     Kind.CLAMPED,
@@ -91,7 +96,7 @@ class MapWriter:
                     f"{100.0 * float(wrong.mean()):.3g} % of the texels ({float(color.min()):.4g} "
                     f"to {float(color.max()):.4g}); clipped",
                 )
-            self._write(name, np.clip(color, 0.0, 1.0), picture)
+            self._write(name, np.clip(color, 0.0, 1.0) if wrong.any() else color, picture)
             self.written[name] = {
                 "kind": "reflectance",
                 "image": texture.image.name,
@@ -139,7 +144,8 @@ class MapWriter:
             }
         return Map(f"{self.prefix}/{name}", texture, raw=True, scale=emission)
 
-    def _write(self, name: str, color: Floats, picture: _Picture) -> None:
+    def _write(self, name: str, color: npt.NDArray[Any], picture: _Picture) -> None:
+        """Colour (h, w, 3) with the picture's own alpha, as half floats."""
         pixels, channels = picture.pixels, picture.pixels.shape[2]
         if channels in (2, 4):
             alpha = pixels[..., channels - 1 :].astype(np.float64)
@@ -193,6 +199,15 @@ class MapWriter:
             self.report.add(Kind.INVALID, "image-broken", image.source, image.name, problem.problem)
             return None
         return _Picture(found.pixels, found.integers)
+
+
+def _coded(pixels: npt.NDArray[np.generic], gamma: float, diffuse: RGB) -> npt.NDArray[np.float16]:
+    """R of 8-bit codes, (h, w, 3) half floats: a table a channel, no arithmetic a texel."""
+    out = np.empty((*pixels.shape[:2], 3), np.float16)
+    for channel, factor in enumerate(diffuse):
+        table = reflectance_table(gamma, factor).astype(np.float16)
+        out[..., channel] = table[pixels[..., channel if pixels.shape[2] >= 3 else 0]]
+    return out
 
 
 def linear(picture: _Picture, gamma: float) -> Floats:

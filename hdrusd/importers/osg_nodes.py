@@ -208,7 +208,7 @@ class NodeReader:
         for number in np.flatnonzero(usable).tolist():
             near, far = float(pairs[number, 0]), float(pairs[number, 1])
             if pixels:  # many pixels are near
-                near, far = 1.0 / max(far, 1e-9), 1.0 / max(near, 1e-9)
+                near, far = (1.0 / size if size > 1e-9 else 1e9 for size in (far, near))
             ranges[number] = near, far
         made.kind, made.lod_ranges = "lod", tuple(ranges)
 
