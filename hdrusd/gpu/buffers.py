@@ -85,6 +85,22 @@ class LightClass:
     batch: int  # lights an instance: 31 flat vec4 are what OpenGL 3.3 grants between stages
     texels: Floats  # (n + 1, rows, 4); the last is dark and fills the last batch
 
+    def draws(self) -> list[tuple[int, int, int]]:
+        """(first light, lights a batch, batches): full batches, then the least that holds the rest.
+
+        A batch costs as much as its size, lights or none.
+        """
+        full, rest = divmod(len(self.texels) - 1, self.batch)
+        draws = [(0, self.batch, full)] if full else []
+        if rest:
+            size = min(size for size in (*_SMALL_BATCHES, self.batch) if size >= rest)
+            draws.append((full * self.batch, size, 1))
+        return draws
+
+
+#: Sizes that light.frag has beside the full one of each class.
+_SMALL_BATCHES = (1, 4)
+
 
 def light_classes(lights: npt.NDArray[np.void], camera: Camera) -> list[LightClass]:
     """The lights by what they need, in the layouts of light.frag; empty classes left out.

@@ -110,24 +110,30 @@ class HdrRenderer:
         # A software device runs both sides of a branch, so gloss is a variant of the program.
         glossy = any(any(m.specular) or m.metallic > 0.0 for m in scene.materials)
         for kind in light_classes(scene.lights, scene.camera):
-            program = self.programs.get(
-                "gpu/shaders/light.vert",
-                "gpu/shaders/light.frag",
-                {kind.define: 1, "ROWS": kind.rows, "BATCH": kind.batch}
-                | ({"GLOSSY": 1} if glossy else {}),
-            )
             rows = len(kind.texels)
             table = ctx.texture((kind.rows, rows), 4, kind.texels, dtype="f4")
             table.filter = (moderngl.NEAREST, moderngl.NEAREST)
             table.use(len(LAYERS))
-            uniforms = {"lights": len(LAYERS), "count": rows - 1, "lambert_scale": self.scale}
-            uniforms |= {name: unit for unit, name in enumerate(LAYERS[:-1])}
-            for name, value in (uniforms | window_uniforms(scene.camera)).items():
-                set_used(program, name, value)
-            if program not in self._passes:
-                self._passes[program] = ctx.vertex_array(program, [])
-            batches = -(-(rows - 1) // kind.batch)
-            self._passes[program].render(moderngl.TRIANGLES, vertices=3, instances=batches)
+            for first, batch, batches in kind.draws():
+                defines: dict[str, str | int | float] = {
+                    kind.define: 1,
+                    "ROWS": kind.rows,
+                    "BATCH": batch,
+                    "ALL": f"ALL{batch}",
+                }
+                program = self.programs.get(
+                    "gpu/shaders/light.vert",
+                    "gpu/shaders/light.frag",
+                    defines | ({"GLOSSY": 1} if glossy else {}),
+                )
+                uniforms = {"lights": len(LAYERS), "first": first, "count": rows - 1}
+                uniforms |= {name: unit for unit, name in enumerate(LAYERS[:-1])}
+                shared = {"lambert_scale": self.scale} | window_uniforms(scene.camera)
+                for name, value in (uniforms | shared).items():
+                    set_used(program, name, value)
+                if program not in self._passes:
+                    self._passes[program] = ctx.vertex_array(program, [])
+                self._passes[program].render(moderngl.TRIANGLES, vertices=3, instances=batches)
             table.release()
         self._frame.depth_mask = True
         ctx.enable_only(moderngl.NOTHING)

@@ -38,13 +38,12 @@ layout(location = 0) out vec4 hdr;
 #define GLOSS(i) { LIGHT(i) sum += lux; \
     gloss += lux * blinn_phong(half_cosine(nl, nv, dot(l, v)), shininess, lambert_scale); }
 
-#if BATCH == 7
-#define ALL(X) X(0) X(1) X(2) X(3) X(4) X(5) X(6)
-#elif BATCH == 10
-#define ALL(X) X(0) X(1) X(2) X(3) X(4) X(5) X(6) X(7) X(8) X(9)
-#else
-#define ALL(X) X(0) X(1) X(2) X(3) X(4) X(5) X(6) X(7) X(8) X(9) X(10) X(11) X(12) X(13) X(14)
-#endif
+// ALL, one of these, applies X to each light of the batch.
+#define ALL1(X) X(0)
+#define ALL4(X) ALL1(X) X(1) X(2) X(3)
+#define ALL7(X) ALL4(X) X(4) X(5) X(6)
+#define ALL10(X) ALL7(X) X(7) X(8) X(9)
+#define ALL15(X) ALL10(X) X(10) X(11) X(12) X(13) X(14)
 
 uniform float lambert_scale;  // 1/pi, or 1 for petit2010
 

@@ -1,6 +1,7 @@
 // One instance is one batch of lights: its vertices fetch them once for the whole screen.
 // A buffer read in every pixel is what costs on a software device, not the arithmetic.
 uniform sampler2D lights;  // a row a light: ROWS texels of 4 floats, the last row dark
+uniform int first;         // the light that this draw begins with
 uniform int count;         // lights in all
 
 flat out vec4 data[BATCH * ROWS];
@@ -13,5 +14,5 @@ void main()
     gl_Position = vec4(corner, 1.0, 1.0);  // farthest depth: only pixels with a surface pass
     for (int i = 0; i < BATCH; ++i)
         for (int k = 0; k < ROWS; ++k)
-            data[i * ROWS + k] = texelFetch(lights, ivec2(k, min(gl_InstanceID * BATCH + i, count)), 0);
+            data[i * ROWS + k] = texelFetch(lights, ivec2(k, min(first + gl_InstanceID * BATCH + i, count)), 0);
 }
