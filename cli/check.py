@@ -20,12 +20,14 @@ from .options import FILE, STRICT, tell
 @click.option("--strict", is_flag=True, help=f"Exit with {STRICT} on warnings too.")
 def command(stage: Path, as_json: bool, strict: bool) -> None:
     """Validate STAGE: units, light intensities, reflectances, sky."""
-    from hdrusd.render import open_stage
+    from hdrusd.render import open_stage, usd_warnings
     from hdrusd.report import Report
     from hdrusd.validation import validate
 
     report = Report()
-    problems = validate(open_stage(stage, report=report))
+    opened = open_stage(stage, report=report)
+    with usd_warnings(stage, report):
+        problems = validate(opened)
     if as_json:
         click.echo(json.dumps([asdict(problem) for problem in problems]))
     else:

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from hdrusd.errors import HdrusdError
+from hdrusd.photometry.estimate import DEFAULT_RULE, RULES
 
 from .options import FILE, FOLDER, finish, report_options, tell, write_report
 
@@ -19,14 +20,15 @@ from .options import FILE, FOLDER, finish, report_options, tell, write_report
 @click.option(
     "--estimate",
     metavar="RULE",
-    default="night-20lx",
+    default=DEFAULT_RULE,
     show_default=True,
-    help="Rule for lights and emission without a unit: night-20lx, interior-100lx, day-10000lx.",
+    help=f"Rule for lights and emission without a unit: {', '.join(RULES.names())}.",
 )
 @click.option(
     "--gamma",
     type=click.FloatRange(0.1, 10.0),
-    help="R = T^gamma * D. [default: the photometry file's, else 2.2]",
+    help="Exponent in R = T^gamma * D of all materials; overrides the photometry file. "
+    "[default: the photometry file's, else 2.2]",
 )
 @click.option(
     "--meters-per-unit",
@@ -42,7 +44,11 @@ from .options import FILE, FOLDER, finish, report_options, tell, write_report
     metavar="METERS",
     help="Metres a source unit, where the format does not say or is wrong.",
 )
-@click.option("--up", type=click.Choice(["Y", "Z"]), help="Up axis, likewise.")
+@click.option(
+    "--up",
+    type=click.Choice(["Y", "Z"]),
+    help="Up axis of the source, where the format does not say or is wrong.",
+)
 @click.option(
     "--root",
     "roots",
@@ -78,9 +84,11 @@ def command(
 
     Beside OUTPUT stand its layers (geometry, look, photometry) and textures.
     """
-    from hdrusd.convert import Options, convert
+    from hdrusd.convert import OUTPUT_SUFFIXES, Options, convert
     from hdrusd.report import Report
 
+    if output.suffix.lower() not in OUTPUT_SUFFIXES:
+        raise click.UsageError(f"{output}: want a name that ends in {' or '.join(OUTPUT_SUFFIXES)}")
     report = Report()
     options = Options(
         photometry=photometry,

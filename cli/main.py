@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import traceback
 from importlib import import_module
@@ -97,6 +98,8 @@ def hdrusd() -> None:
 
 def main() -> None:
     """Entry point: run, and turn what goes wrong into one line and an exit code."""
+    # A scheduler's SIGTERM is a Ctrl-C: what is half done is cleared away.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         code = hdrusd.main(prog_name="hdrusd", standalone_mode=False)
     except click.ClickException as error:

@@ -54,7 +54,10 @@ def operator_options(function: F) -> F:
             help="Parameter of the operator; repeatable. See: hdrusd operators NAME.",
         ),
         click.option(
-            "--operator", "-op", metavar="NAME", help="Tone mapping operator. [default: reinhard02]"
+            "--operator",
+            "-op",
+            metavar="NAME",
+            help="Tone mapping operator. [default: the stage's, else reinhard02]",
         ),
     ):
         function = option(function)
@@ -77,11 +80,11 @@ def parse_settings(settings: tuple[str, ...]) -> dict[str, Any]:
 
 def chosen_operator(name: str | None, settings: dict[str, Any]) -> Operator:
     """The operator, its parameters tried on a frame of one luminance. Raises UsageError."""
-    from hdrusd.tonemap.operator import OPERATORS, Statistics
+    from hdrusd.tonemap.operator import DEFAULT_OPERATOR, OPERATORS
 
-    operator = OPERATORS[name or "reinhard02"]
+    operator = OPERATORS[name or DEFAULT_OPERATOR]
     try:
-        operator.uniforms(Statistics(1.0, 1.0, 1.0, 1.0, 1.0, 1.0), operator.settings(settings))
+        operator.check(settings)
     except HdrusdError as problem:
         raise click.UsageError(f"--set: {problem}") from problem
     return operator

@@ -165,9 +165,9 @@ def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
             check_pattern(pattern, times)
     operator = None
     settings = parse_settings(options["settings"])
-    if png is not None:
+    if png is not None and options["operator"]:
         operator = chosen_operator(options["operator"], settings)
-    elif options["operator"] or settings:
+    elif png is None and (options["operator"] or settings):
         raise click.UsageError("--operator: nothing is tone mapped; want --png or OUTPUT.png")
     return Job(
         stage=stage,

@@ -3,6 +3,7 @@
     HdrusdError
         InputError                 a file says something we cannot use
         UnknownNameError           a name that is not in a registry
+        ParameterError             an operator's parameter out of its range
         ShaderError                GLSL did not compile or link
         ContextError               no OpenGL 3.3 context can be had
         SchemaRegistrationError    the USD schemas cannot be registered any more
@@ -69,6 +70,12 @@ class UnknownNameError(HdrusdError):
         near = get_close_matches(name, known, n=1)
         hint = f"did you mean {near[0]}? " if near else ""
         super().__init__(f"{kind}: {name}: unknown; {hint}known: {', '.join(known)}")
+
+
+class ParameterError(HdrusdError):
+    """A parameter of an operator that is no number or out of its range."""
+
+    exit_code = 2
 
 
 class ShaderError(HdrusdError):

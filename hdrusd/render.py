@@ -16,14 +16,14 @@ import numpy.typing as npt
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
 
 from hdrusd.display import Display, Writer
-from hdrusd.errors import InputError, SourceRef
+from hdrusd.errors import HdrusdError, InputError, SourceRef
 from hdrusd.frames import frame_path
 from hdrusd.gpu.hdr import HdrRenderer, Reflection
 from hdrusd.gpu.program import Programs
 from hdrusd.images import half_clipped, read_image, write_exr, write_png
 from hdrusd.report import Kind, Report
 from hdrusd.scene import Camera, ImageData, TextureRef
-from hdrusd.tonemap.operator import Operator, Parameters, Statistics
+from hdrusd.tonemap.operator import DEFAULT_OPERATOR, OPERATORS, Operator, Parameters, Statistics
 from hdrusd.units import TEXTURE_GAMMA
 from hdrusd.usd.assets import asset_bytes
 from hdrusd.usd.extract import StageReader
@@ -47,7 +47,7 @@ class Job:
     camera: str | None = None
     width: int | None = None
     height: int | None = None
-    operator: Operator | None = None  # None: no display picture
+    operator: Operator | None = None  # None: the stage's, where a PNG is asked for
     parameters: Parameters = field(default_factory=dict)
     reflection: Reflection = "lambert"
     gamma: float = TEXTURE_GAMMA
@@ -186,15 +186,22 @@ class Renderer:
         self.camera_path = job.camera or self.settings.camera
         self.size = self._size()
         programs = Programs(ctx)
-        self.hdr = HdrRenderer(
-            ctx,
-            programs,
-            self.size,
-            TextureLoader(job.stage, report),
-            reflection=job.reflection,
-            gamma=job.gamma,
-        )
-        self.display = Display(ctx, programs, job.operator) if job.operator is not None else None
+        try:
+            self.hdr = HdrRenderer(
+                ctx,
+                programs,
+                self.size,
+                TextureLoader(job.stage, report),
+                reflection=job.reflection,
+                gamma=job.gamma,
+            )
+        except moderngl.Error as problem:
+            width, height = self.size
+            raise HdrusdError(
+                f"{width} x {height} pixels: too large for this device ({problem})"
+            ) from problem
+        operator = self._operator()
+        self.display = Display(ctx, programs, operator) if operator is not None else None
 
     @property
     def times(self) -> Sequence[float]:
@@ -231,6 +238,18 @@ class Renderer:
                 self.job.stage,
                 f"{camera.name}: sees nothing; want finite numbers, film and focal length above 0",
             )
+
+    def _operator(self) -> Operator | None:
+        """The user's, else the stage's, else Reinhard's; None where no picture is asked for."""
+        job, settings = self.job, self.settings
+        if job.operator is not None or job.png is None:
+            return job.operator
+        operator = OPERATORS[settings.operator or DEFAULT_OPERATOR]
+        operator.check(job.parameters)
+        if settings.peak is not None or settings.black is not None:
+            text = f"display peak and black are recorded; {operator.name} does not read them"
+            self.report.add(Kind.DROPPED, "display-unused", SourceRef(job.stage), "", text)
+        return operator
 
     def _parameters(self, operator: Operator, camera: Camera) -> dict[str, Any]:
         """The user's, else the stage's for this operator, else the camera's exposure."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -111,7 +110,3 @@ class Report:
             "summary": self.summary(),
             "findings": [finding.as_dict() for finding in self],
         }
-
-    def to_json(self) -> str:
-        """``as_dict`` as text."""
-        return json.dumps(self.as_dict(), indent=1)

@@ -259,8 +259,12 @@ def check_material(prim: Usd.Prim, span: UsdValidation.ValidationTimeRange) -> I
             yield from _bad_numbers(source, f"inputs:{name}", span, _REFLECTANCE)
         emissive = input_source(surface, "emissiveColor")
         faults += _bad_numbers(emissive, "inputs:emissiveColor", span, _NOT_NEGATIVE)
+        texture = _emissive_texture(surface)
+        if texture is not None:
+            scale = input_source(texture, "scale")
+            faults += _bad_numbers(scale, f"{texture.GetName()}.inputs:scale", span, _NOT_NEGATIVE)
         if not faults and luminance and luminance.HasAuthoredValue():
-            yield from _emission_disagreement(surface, luminance, span)
+            yield from _emission_disagreement(surface, texture, luminance, span)
     yield from faults
 
 
@@ -274,23 +278,51 @@ def _preview_surface(prim: Usd.Prim) -> Usd.Prim | None:
     return shader.GetPrim()
 
 
-def _emission_disagreement(
-    surface: Usd.Prim, luminance: Usd.Attribute, span: UsdValidation.ValidationTimeRange
-) -> Iterator[_Fault]:
+def _emissive_node(surface: Usd.Prim) -> Usd.Prim | None:
+    """The node whose output is the emission, None where the surface states the colour."""
     own = surface.GetAttribute("inputs:emissiveColor")
-    if own and UsdShade.Output.IsOutput(connection_end(own)):
-        return  # a texture: its pixels are not read here
-    emissive = input_source(surface, "emissiveColor")
+    end = connection_end(own) if own else None
+    return end.GetPrim() if end and UsdShade.Output.IsOutput(end) else None
+
+
+def _emissive_texture(surface: Usd.Prim) -> Usd.Prim | None:
+    """The UsdUVTexture of the emission, where there is one."""
+    node = _emissive_node(surface)
+    found = node is not None and UsdShade.Shader(node).GetIdAttr().Get() == "UsdUVTexture"
+    return node if found else None
+
+
+def _emission_disagreement(
+    surface: Usd.Prim,
+    texture: Usd.Prim | None,
+    luminance: Usd.Attribute,
+    span: UsdValidation.ValidationTimeRange,
+) -> Iterator[_Fault]:
+    """Luminance against emissiveColor, or against the scale of its texture.
+
+    photometric:luminance is that of the texture's value 1, so no pixel need be read.
+    """
+    if texture is None:
+        if _emissive_node(surface) is not None:
+            return  # another node; nothing here says what its 1 is
+        name, emissive = "emissiveColor", input_source(surface, "emissiveColor")
+        unauthored = (0.0, 0.0, 0.0)  # UsdPreviewSurface's default
+    else:
+        bias = input_source(texture, "bias")
+        if bias and bias.Get(Usd.TimeCode.EarliestTime()) not in (None, Gf.Vec4f(0.0)):
+            return  # 1 is not what stands for the luminance
+        name, emissive = f"{texture.GetName()}.inputs:scale", input_source(texture, "scale")
+        unauthored = (1.0, 1.0, 1.0)  # UsdUVTexture's default
     for time in _times([emissive, luminance], span):
         said = luminance.Get(time)
-        color = emissive.Get(time) if emissive else (0.0, 0.0, 0.0)  # UsdPreviewSurface's default
+        color = emissive.Get(time) if emissive else unauthored
         if said is None or color is None:
             continue
-        plain = _luminance(color)
+        plain = _luminance(color[:3])  # a scale has alpha too
         if not math.isclose(plain, said, rel_tol=AGREEMENT):
             yield _Fault(
                 "Disagreement",
-                f"photometric:luminance {said:.6g} cd/m2, but emissiveColor has {plain:.6g} cd/m2"
+                f"photometric:luminance {said:.6g} cd/m2, but {name} has {plain:.6g} cd/m2"
                 f"{_when(time)}; want both within 0.1 %",
             )
             return
@@ -362,7 +394,7 @@ def _bad_numbers(
         value = source.Get(time)
         if value is None:
             continue
-        if not isinstance(value, (int, float, Gf.Vec3f, Gf.Vec3d, Gf.Vec3h)):
+        if not isinstance(value, (int, float, Gf.Vec3f, Gf.Vec3d, Gf.Vec3h, Gf.Vec4f)):
             yield _Fault("NoNumber", f"{name} {value!r}; want {allowed.want}")
             return
         numbers = np.asarray(value, np.float64)
@@ -403,7 +435,9 @@ def _channels(numbers: Any) -> str:
 
 
 def _when(time: Usd.TimeCode) -> str:
-    return f" at time {time.GetValue():g}" if time.IsNumeric() else ""
+    """Nothing for the default and the earliest time, which stand for no sample."""
+    sample = time.IsNumeric() and not time.IsEarliestTime()
+    return f" at time {time.GetValue():g}" if sample else ""
 
 
 def _register_checks() -> None:

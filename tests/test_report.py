@@ -97,7 +97,7 @@ def test_the_limit_is_for_each_code_and_each_file() -> None:
 
 
 def test_json_lists_what_is_listed_and_counts_the_rest() -> None:
-    document = json.loads(report_of(LISTED + 3).to_json())
+    document = json.loads(json.dumps(report_of(LISTED + 3).as_dict()))
     assert document["format"] == "hdrusd-report/1"
     assert document["summary"] == f"{LISTED + 3} findings: {LISTED + 3} dropped"
     assert len(document["findings"]) == LISTED + 1

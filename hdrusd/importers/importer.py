@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -85,13 +86,13 @@ class Resolver:
             *self.search,
         ]
         candidates = [base / name, *(folder / tail for folder in folders)]
-        refused = False
+        refused: Path | None = None
         for tried, candidate in enumerate(candidates):
             found = _existing(candidate)
             if found is None:
                 continue
             if not self.allowed(found):
-                refused = True
+                refused = refused or found
                 continue
             if tried > 0 or not candidate.exists():
                 self.report.add(
@@ -102,9 +103,10 @@ class Resolver:
                     f"{reference}: not found as written; {found.parent.name}/{found.name} is used",
                 )
             return found
-        why = (
-            "outside the declared roots; add --root" if refused else "not found; add --search-path"
-        )
+        why = "not found; add --search-path"
+        if refused:
+            ancestor = os.path.commonpath([base, refused.parent])
+            why = f"outside the declared roots; --root {ancestor} would allow it"
         code = "file-refused" if refused else "file-missing"
         self.report.add(Kind.MISSING, code, place, thing, f"{reference}: {why}")
         return None

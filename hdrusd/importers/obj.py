@@ -60,7 +60,7 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
     source = resolver.source
     tally = Tally()
     file = parse(resolver, tally)
-    text = "OBJ states no unit and no up axis: 1 unit = 1 m, Y up"
+    text = "OBJ states no unit and no up axis: 1 unit = 1 m, Y up (--source-unit, --up Z)"
     report.add(Kind.ASSUMED, "obj-units", SourceRef(source), "", text)
     scene = LegacyScene(source, "obj", generator=file.generator)
     scene.materials = _libraries(file, resolver, report)

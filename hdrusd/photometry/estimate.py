@@ -11,9 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from hdrusd.legacy.scene import RGB, Light
 from hdrusd.registry import Registry
+
+if TYPE_CHECKING:  # the command line's help lists the rules, and NumPy would slow it
+    from hdrusd.legacy.scene import RGB, Light
 
 #: Distance at which an unattenuated legacy light is taken to give E_ref: a tenth of the
 #: scene's diagonal, but at least this many metres.

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.colour import clean, luminance
-from hdrusd.errors import HdrusdError, UnknownNameError
+from hdrusd.errors import HdrusdError, ParameterError, UnknownNameError
 from hdrusd.registry import Registry
 
 Array = npt.NDArray[Any]
@@ -133,6 +133,10 @@ class Operator:
                 raise UnknownNameError(f"{self.name}: parameter", name, known)
         return {**known, **(given or {})}
 
+    def check(self, given: Parameters) -> None:
+        """Try parameters on a frame of one luminance. Raises UnknownNameError, ParameterError."""
+        self.uniforms(Statistics(1.0, 1.0, 1.0, 1.0, 1.0, 1.0), self.settings(given))
+
     def apply(
         self, rgb: npt.ArrayLike, stats: Statistics | None = None, params: Parameters | None = None
     ) -> Array:
@@ -145,13 +149,13 @@ class Operator:
 
 
 def number(operator: str, name: str, value: Value, low: float, high: float) -> float:
-    """A parameter's value as a float in [low, high]; raises HdrusdError otherwise."""
+    """A parameter's value as a float in [low, high]; raises ParameterError otherwise."""
     try:
         result = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         result = math.nan
     if not low <= result <= high:
-        raise HdrusdError(f"{operator}: {name}: {value}; want {low:g} to {high:g}")
+        raise ParameterError(f"{operator}: {name}: {value}; want {low:g} to {high:g}")
     return result
 
 
@@ -161,6 +165,9 @@ def measured(operator: str, stats: Statistics | None) -> Statistics:
         raise HdrusdError(f"{operator}: no statistics of the frame; want those it was made with")
     return stats
 
+
+#: The operator where neither the user nor the stage names one: the paper's.
+DEFAULT_OPERATOR = "reinhard02"
 
 OPERATORS: Registry[Operator] = Registry("operator", "hdrusd.tonemap")
 OPERATORS.add("reinhard02", "hdrusd.tonemap.reinhard02:OPERATOR")

@@ -18,11 +18,12 @@ from hdrusd.errors import InputError, SourceRef
 from hdrusd.report import Kind, Report
 from hdrusd.scene import LIGHT, NO_CONE, Camera, Draw, Geometry, RenderScene
 from hdrusd.units import dome_luminance
+from hdrusd.usd.ambient import has_ambient, read_ambient
 from hdrusd.usd.bindings import Bindings, Piece
 from hdrusd.usd.camera import Conform, framing_camera, read_camera
 from hdrusd.usd.facing import facing
-from hdrusd.usd.instancer import instancer_draws
-from hdrusd.usd.light import light_time_varying, read_dome, read_light_row
+from hdrusd.usd.instancer import instancer_content
+from hdrusd.usd.light import light_time_varying, read_light_row
 from hdrusd.usd.lux import is_light
 from hdrusd.usd.mesh import GeometryReader, time_varying
 
@@ -64,6 +65,7 @@ class _Plan:
     domes: list[Usd.Prim] = field(default_factory=list)
     instancers: list[Usd.Prim] = field(default_factory=list)
     prototypes: dict[Sdf.Path, Gprim | None] = field(default_factory=dict)
+    has_light: bool = False  # any light at all, hidden ones and those we cannot show included
 
 
 class StageReader:
@@ -100,9 +102,11 @@ class StageReader:
         self.bindings.update(code)
         self._reads += 1
         rows = [row for light in plan.lights if (row := self._light(light, cache)) is not None]
+        for instancer in plan.instancers:
+            rows.extend(self._instanced_lights(instancer, cache, code))
         lights = np.concatenate(rows) if rows else np.zeros(0, LIGHT)
-        ambient = self._ambient(code)
-        if self.default_sky and not self._has_light():
+        ambient = read_ambient(self.stage, plan.domes, code, self.report)
+        if self.default_sky and not plan.has_light:
             lights, ambient = _default_light(camera), (DEFAULT_SKY,) * 3
             self._finding(
                 Kind.ASSUMED,
@@ -177,7 +181,9 @@ class StageReader:
         return self._plan
 
     def _walk(self, code: Usd.TimeCode) -> _Plan:
-        plan = _Plan()
+        plan = _Plan(has_light=has_ambient(self.stage))
+        everything = Usd.PrimRange(self.stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
+        plan.has_light |= any(is_light(prim) for prim in everything)
         walk = iter(Usd.PrimRange(self.stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()))
         for prim in walk:
             if not self._wanted(prim):
@@ -230,13 +236,6 @@ class StageReader:
             hides=_hides(prim),
         )
 
-    def _has_light(self) -> bool:
-        """Whether the stage has any light at all, lit in this frame or not."""
-        assert self._plan is not None
-        root = self.stage.GetDefaultPrim()
-        ambient = bool(root) and root.HasAPI("HdrusdAmbientAPI")
-        return bool(self._plan.lights or self._plan.domes or ambient)
-
     # -- one frame -----------------------------------------------------------------------
 
     def _light(self, light: Light, cache: UsdGeom.XformCache) -> npt.NDArray[np.void] | None:
@@ -253,29 +252,23 @@ class StageReader:
             light.row = row
         return light.row
 
-    def _ambient(self, code: Usd.TimeCode) -> tuple[float, float, float]:
-        """Lux per channel from everywhere: our AmbientAPI, and domes that it does not stand for."""
-        total = np.zeros(3)
-        spoken_for: set[Sdf.Path] = set()
-        root = self.stage.GetDefaultPrim()
-        if root and root.HasAPI("HdrusdAmbientAPI"):
-            lux = root.GetAttribute("photometric:ambient:illuminance").Get(code)
-            color = root.GetAttribute("photometric:ambient:color").Get(code)
-            sky = np.asarray(color if color is not None else (1, 1, 1)) * float(lux or 0.0)
-            if lux is not None and np.isfinite(sky).all() and (sky >= 0.0).all():
-                total += sky
-                spoken_for.update(root.GetRelationship("photometric:ambient:light").GetTargets())
-        for prim in self._plan.domes if self._plan else []:
-            if prim.GetPath() not in spoken_for and _visible(prim, code):
-                lux = np.asarray(read_dome(prim, code, self.report) or (0.0, 0.0, 0.0))
-                if np.isfinite(lux).all() and (lux >= 0.0).all():
-                    total += lux
+    def _instanced_lights(
+        self, prim: Usd.Prim, cache: UsdGeom.XformCache, code: Usd.TimeCode
+    ) -> Iterator[npt.NDArray[np.void]]:
+        if not _visible(prim, code):
+            return
+        world = np.array(cache.GetLocalToWorldTransform(prim), np.float64)
+        for source, copies in instancer_content(prim, code, self.purposes, self.report):
+            if not is_light(source):
+                continue
+            for matrix in copies @ world:
+                place = Gf.Matrix4d(matrix)
+                row = read_light_row(source, code, place, self.unit, self.report)
+                if row is not None and _sound(row):
+                    yield row
                 else:
-                    self._finding(
-                        Kind.INVALID, "light-invalid", "not finite or negative; left out", prim
-                    )
-        r, g, b = (float(v) for v in total)
-        return r, g, b
+                    text = "not finite, negative or no lamp; left out"
+                    self._finding(Kind.INVALID, "light-invalid", text, source)
 
     def _all_draws(self, cache: UsdGeom.XformCache, code: Usd.TimeCode) -> Iterator[Draw]:
         plan = self._planned(code)
@@ -317,8 +310,8 @@ class StageReader:
         self, prim: Usd.Prim, cache: UsdGeom.XformCache, code: Usd.TimeCode
     ) -> Iterable[Draw]:
         world = cache.GetLocalToWorldTransform(prim)
-        for source, copies in instancer_draws(prim, code, self.purposes, self.report):
-            gprim = self._prototype(source, code)
+        for source, copies in instancer_content(prim, code, self.purposes, self.report):
+            gprim = None if is_light(source) else self._prototype(source, code)
             if gprim is None:
                 continue
             self._read_geometry(gprim, code)

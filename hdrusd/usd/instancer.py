@@ -14,13 +14,13 @@ from hdrusd.report import Kind, Report
 from hdrusd.usd.lux import is_light
 
 
-def instancer_draws(
+def instancer_content(
     prim: Usd.Prim, time: Usd.TimeCode, purposes: Iterable[str], report: Report
 ) -> Iterator[tuple[Usd.Prim, npt.NDArray[np.float64]]]:
-    """Each gprim below the prototypes with (k, 4, 4) row-vector matrices to the instancer's space.
+    """Each gprim and light of the prototypes, with (k, 4, 4) row-vector matrices of its copies.
 
-    Copies masked out or invisible are left out. Lights in prototypes and
-    instancers inside instancers are findings.
+    The matrices lead to the instancer's space. Copies masked out or invisible are
+    left out. Instancers inside instancers are findings.
     """
     instancer = UsdGeom.PointInstancer(prim)
     place = SourceRef(Path(prim.GetStage().GetRootLayer().identifier))
@@ -56,7 +56,7 @@ def instancer_draws(
             continue
         for source in Usd.PrimRange(root, Usd.TraverseInstanceProxies()):
             imageable = UsdGeom.Imageable(source)
-            if source.IsA(UsdGeom.PointInstancer) or is_light(source):
+            if source.IsA(UsdGeom.PointInstancer):
                 report.add(
                     Kind.DROPPED,
                     "instancer-content",
@@ -65,7 +65,7 @@ def instancer_draws(
                     f"{source.GetTypeName()} inside a PointInstancer is not shown",
                 )
             elif (
-                source.IsA(UsdGeom.Gprim)
+                (source.IsA(UsdGeom.Gprim) or is_light(source))
                 and imageable.ComputePurpose() in purposes
                 and imageable.ComputeVisibility(time) != UsdGeom.Tokens.invisible
             ):

@@ -19,10 +19,13 @@ from hdrusd.photometry.light import PhotometricLight
 from hdrusd.report import Kind, Report
 from hdrusd.scene import LIGHT, NO_CONE
 from hdrusd.units import LUMINANCE_WEIGHTS, distant_luminance, dome_luminance, sphere_luminance
-from hdrusd.usd.lux import LuxReading, input_source, read_lux
+from hdrusd.usd.lux import LuxReading, input_number, read_lux
 
 #: Full angle of a distant light that we write: the sun's and the moon's, degrees.
 DISTANT_ANGLE = 0.53
+
+#: How far plain and photometric values may differ before that is said.
+AGREEMENT = 1e-3
 
 _API = "HdrusdPhotometricLightAPI"
 _INTENSITY = "inputs:photometric:luminousIntensity"
@@ -132,7 +135,8 @@ def read_light_row(
     reading = read_lux(prim, time, world=world, meters_per_unit=meters_per_unit)
     if reading is None or reading.kind in ("dome", "other"):
         return None
-    strength, color = _photometric(prim, reading, time)
+    strength, color = _photometric(prim, reading, time, report)
+    _note_unused(prim, time, report)
     row = np.zeros(1, LIGHT)
     rotation = world.ExtractRotationMatrix()
     axis = -np.array(rotation.GetRow(2), np.float64)
@@ -166,24 +170,48 @@ def read_dome(
     texture = prim.GetAttribute("inputs:texture:file")
     if texture and texture.Get() and texture.Get().path:
         _finding(report, prim, "dome-texture", "dome texture is not read; its colour is uniform")
-    strength, color = _photometric(prim, reading, time)
+    strength, color = _photometric(prim, reading, time, report)
+    _note_unused(prim, time, report)
     r, g, b = (float(strength * c) for c in color)
     return r, g, b
 
 
 def _photometric(
-    prim: Usd.Prim, reading: LuxReading, time: Usd.TimeCode
+    prim: Usd.Prim, reading: LuxReading, time: Usd.TimeCode, report: Report | None = None
 ) -> tuple[float, npt.NDArray[np.float64]]:
-    """Strength (cd or lx) and colour of luminance 1: the photometric value, else the plain one."""
+    """Strength (cd or lx) and colour of luminance 1: the photometric value, else the plain one.
+
+    That the two differ, because somebody edited one of them, is a finding.
+    """
     rgb = np.asarray(reading.intensity, np.float64)
     luminance = float(rgb @ LUMINANCE_WEIGHTS)
     usable = luminance > 0.0 and math.isfinite(luminance)
     color = rgb / luminance if usable else np.ones(3)
-    name = _ILLUMINANCE if reading.kind in ("distant", "dome") else _INTENSITY
-    attribute = input_source(prim, name.removeprefix("inputs:"))
-    if attribute and attribute.HasAuthoredValue():
-        return float(attribute.Get(time)), color
-    return luminance, color
+    distant = reading.kind in ("distant", "dome")
+    name = _ILLUMINANCE if distant else _INTENSITY
+    attribute = prim.GetAttribute(name)
+    if not attribute or not attribute.HasAuthoredValue():
+        return luminance, color
+    stated = input_number(prim, name.removeprefix("inputs:"), time)
+    if report is not None and abs(stated - luminance) > AGREEMENT * max(stated, luminance):
+        unit = "lx" if distant else "cd"
+        text = (
+            f"UsdLux inputs say {luminance:.6g} {unit}, photometry {stated:.6g} {unit}; "
+            "the latter is shown"
+        )
+        _finding(report, prim, "light-disagreement", text, Kind.ASSUMED)
+    return stated, color
+
+
+def _note_unused(prim: Usd.Prim, time: Usd.TimeCode, report: Report) -> None:
+    """What UsdLux says and shader 1 has no term for."""
+    for name in ("diffuse", "specular"):
+        if input_number(prim, name, time) != 1.0:
+            _finding(report, prim, "light-multiplier", f"inputs:{name} is not used")
+    authored = [prop.GetName() for prop in prim.GetAuthoredProperties()]
+    for name in ("collection:lightLink", "light:filters"):
+        if any(prop.startswith(name) for prop in authored):
+            _finding(report, prim, "light-linking", f"{name} is not used: it lights everything")
 
 
 def _write_shaping(prim: Usd.Prim, light: PhotometricLight) -> None:
@@ -201,13 +229,18 @@ def _read_shaping(
     if not prim.HasAPI(UsdLux.ShapingAPI):
         return
     shaping = UsdLux.ShapingAPI(prim)
-    angle = float(shaping.GetShapingConeAngleAttr().Get(time))
-    softness = min(max(float(shaping.GetShapingConeSoftnessAttr().Get(time)), 0.0), 1.0)
+    angle, softness, focus = (
+        input_number(prim, f"shaping:{name}", time)
+        for name in ("cone:angle", "cone:softness", "focus")
+    )
+    if not math.isfinite(angle + softness + focus):
+        row["exponent"] = math.nan  # the caller leaves it out, with a finding
+        return
     if 0.0 <= angle < 180.0:
         outer = math.radians(angle)
         row["outer"] = np.minimum(row["outer"], outer)
-        row["inner"] = np.minimum(row["inner"], outer * (1.0 - softness))
-    row["exponent"] += max(float(shaping.GetShapingFocusAttr().Get(time)), 0.0)
+        row["inner"] = np.minimum(row["inner"], outer * (1.0 - min(max(softness, 0.0), 1.0)))
+    row["exponent"] += max(focus, 0.0)
     profile = shaping.GetShapingIesFileAttr().Get(time)
     if profile and profile.path:
         _finding(report, prim, "ies-profile", f"{profile.path}: profile is not read")

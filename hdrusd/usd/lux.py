@@ -131,7 +131,7 @@ def read_lux(
     if kind == "dome":
         factor = units.dome_illuminance(1.0)
     elif kind == "distant":
-        factor = _distant_factor(_number(prim, "angle", time), normalize)
+        factor = _distant_factor(input_number(prim, "angle", time), normalize)
     else:
         if world is None:
             world = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(time)
@@ -144,14 +144,14 @@ def read_lux(
 
 def _luminance(prim: Usd.Prim, time: Usd.TimeCode) -> RGB:
     """Nits per channel before ``normalize``: intensity 2^exposure colour temperature."""
-    exposure = _number(prim, "exposure", time)
+    exposure = input_number(prim, "exposure", time)
     # math.exp2 raises from here on.
     gain = math.exp2(exposure) if exposure < 1024.0 else math.inf
-    scalar = _number(prim, "intensity", time) * gain
+    scalar = input_number(prim, "intensity", time) * gain
     red, green, blue = (scalar * channel for channel in _color(prim, time))
     if _value(prim, "enableColorTemperature", time) is not True:
         return red, green, blue
-    kelvin = _number(prim, "colorTemperature", time)
+    kelvin = input_number(prim, "colorTemperature", time)
     if math.isnan(kelvin):  # BlackbodyTemperatureAsRgb(nan) is a segmentation fault in 26.11
         return math.nan, math.nan, math.nan
     tint = UsdLux.BlackbodyTemperatureAsRgb(kelvin)
@@ -183,9 +183,14 @@ def _area_factor(
     square_unit = meters_per_unit * meters_per_unit
     face = Gf.Cross(x, y).GetLength()
     if kind == "rect":
-        area = _number(prim, "width", time) * _number(prim, "height", time) * face * square_unit
+        area = (
+            input_number(prim, "width", time)
+            * input_number(prim, "height", time)
+            * face
+            * square_unit
+        )
         return (square_unit if normalize else area), 0.0
-    radius = _number(prim, "radius", time) * meters_per_unit
+    radius = input_number(prim, "radius", time) * meters_per_unit
     if kind == "sphere":
         radius *= math.cbrt(abs(Gf.Dot(Gf.Cross(x, y), z)))
         candela = square_unit / 4.0 if normalize else units.sphere_intensity(1.0, radius)
@@ -194,7 +199,7 @@ def _area_factor(
         candela = square_unit if normalize else math.pi * radius * radius
     else:
         radius *= math.sqrt(Gf.Cross(y, z).GetLength())
-        length = _number(prim, "length", time) * x.GetLength() * meters_per_unit
+        length = input_number(prim, "length", time) * x.GetLength() * meters_per_unit
         candela = square_unit / math.pi if normalize else 2.0 * radius * length
     return candela, radius
 
@@ -204,7 +209,7 @@ def _value(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Any:
     return source.Get(time) if source else None
 
 
-def _number(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> float:
+def input_number(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> float:
     """A scalar input; NaN where the file wrote something that is no number."""
     value = _value(prim, name, time)
     return float(value) if isinstance(value, (int, float)) else math.nan

@@ -77,7 +77,7 @@ def read_settings(stage: Usd.Stage, path: str | None = None) -> Settings:
     def number(name: str) -> float | None:
         attribute = prim.GetAttribute(name)
         value = attribute.Get() if attribute and attribute.HasAuthoredValue() else None
-        return None if value is None else float(value)
+        return float(value) if isinstance(value, (int, float)) else None
 
     operator = prim.GetAttribute("hdrusd:tonemap:operator")
     size = resolution.Get() if resolution.HasAuthoredValue() else None

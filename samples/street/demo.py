@@ -9,6 +9,7 @@ a camera's exposure, by Reinhard 2002, and its luminance in false colour.
 
 from __future__ import annotations
 
+import argparse
 import subprocess
 import sys
 import time
@@ -31,9 +32,10 @@ SUN, SKY = 50_000.0, 10_000.0
 
 
 def run(*command: object) -> None:
-    """Print a command and run it; a failure ends the demo with the command's own words."""
+    """Print a command and run it. Raises CalledProcessError, the command's own words said."""
     words = [str(word) for word in command]
-    print("$", " ".join(Path(words[0]).name if i == 0 else w for i, w in enumerate(words)))
+    shown = " ".join(Path(words[0]).name if i == 0 else w for i, w in enumerate(words))
+    print("$", shown, flush=True)  # before what the command says on standard error
     subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
 
 
@@ -83,11 +85,26 @@ def write_sheet(out: Path, columns: list[str]) -> Path:
     return path
 
 
-def main() -> None:
+def main() -> int:
+    """Run the demo; returns the exit code, that of the command that failed if one did."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("outdir", type=Path, metavar="OUTDIR", help="folder for all that is made")
+    out = parser.parse_args().outdir
+    try:
+        demo(out)
+    except subprocess.CalledProcessError as failed:
+        name = " ".join(Path(word).name for word in failed.cmd[:2])
+        print(f"demo: {name} ended with exit code {failed.returncode}", file=sys.stderr)
+        # A signal is a negative number here, 128 and more for a shell.
+        return failed.returncode if failed.returncode > 0 else 128 - failed.returncode
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
+    return 0
+
+
+def demo(out: Path) -> None:
     """Make the database, convert it, render it, lay out the sheet."""
-    if len(sys.argv) != 2:
-        sys.exit("usage: demo.py OUTDIR")
-    out = Path(sys.argv[1])
     started = time.perf_counter()
     frames, stage = out / "frames", out / "stage" / "street.usda"
     width = ("--imageWidth", SIZE[0], "--imageHeight", SIZE[1], "-q")
@@ -112,4 +129,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

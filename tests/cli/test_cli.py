@@ -182,6 +182,28 @@ def test_plug_in_that_cannot_be_imported_spares_the_rest(
     assert said.err.splitlines()[-1] == "lamp: the plug-in lamp_plugin:command cannot be loaded"
 
 
+@pytest.mark.parametrize("name", ["a.usdc", "a", "a.usda.zip"])
+def test_output_of_convert_that_is_no_usda_is_wrong_use(
+    hdrusd: CommandLine, tmp_path: Path, name: str
+) -> None:
+    source = tmp_path / "in.obj"
+    source.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    line = hdrusd.refused("convert", source, tmp_path / name, code=2)
+    assert line.endswith(f"{name}: want a name that ends in .usda")
+    assert [path.name for path in tmp_path.iterdir()] == ["in.obj"]
+
+
+def test_check_tells_warnings_of_usd_as_findings(tmp_path: Path) -> None:
+    """USD writes them from C++, with the place in its own source; seen in a process alone."""
+    stage = write_stage(tmp_path / "a.usda", 'def "Far" (references = @gone.usda@) {}', SKY)
+    said = process("check", stage)
+    assert said.code == 4
+    assert "gone.usda" in said.out
+    assert "Warning: in" not in said.err
+    # one of opening and one of USD's validators
+    assert said.err.count("invalid: a.usda: ") == 2
+
+
 def test_closed_pipe_is_no_error(stage: Path) -> None:
     """As in ``hdrusd operators | true``: nobody listens, nothing is said."""
     run = subprocess.run(

@@ -244,8 +244,9 @@ def test_without_a_driver_one_line_says_what_to_install(stage: Path, tmp_path: P
     assert not (tmp_path / "a.exr").exists()
 
 
-def test_interrupt_leaves_whole_frames_only(gl: Any, tmp_path: Path) -> None:
-    """SIGINT in the middle of 200 frames."""
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_interrupt_leaves_whole_frames_only(gl: Any, tmp_path: Path, sent: signal.Signals) -> None:
+    """Ctrl-C, or a scheduler's word to stop, in the middle of 200 frames."""
     moving = CAMERA.replace(
         "xformOp:translate = (0, 0, 4)",
         "xformOp:translate.timeSamples = { 1: (0, 0, 4), 200: (1, 1, 3) }",
@@ -266,7 +267,7 @@ def test_interrupt_leaves_whole_frames_only(gl: Any, tmp_path: Path) -> None:
     deadline = time.monotonic() + 30.0
     while not (frames / "f.0003.png").exists() and time.monotonic() < deadline:
         time.sleep(0.01)
-    job.send_signal(signal.SIGINT)
+    job.send_signal(sent)
     out, err = job.communicate(timeout=30.0)
     assert job.returncode == 130, err
     assert err.strip() == "interrupted"

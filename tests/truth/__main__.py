@@ -1,12 +1,14 @@
 """``python -m tests.truth [TRUTH_DIR] [--out DIR]``: render truth cases and check them.
 
-TRUTH_DIR is by default the set of tests/truth_stages. Exit code 0 when every supported case
-passes; what is not supported is said.
+TRUTH_DIR is by default the set of tests/truth_stages, and that of $HDRUSD_TESTDATA/truth
+where the variable is set. Exit code 0 when every supported case passes; what is not
+supported is said.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import tempfile
 from pathlib import Path
@@ -22,18 +24,27 @@ _OWN = Path(__file__).parent.parent / "truth_stages"
 def main() -> int:
     """Run; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m tests.truth", description=__doc__)
-    parser.add_argument("folder", nargs="?", type=Path, default=_OWN, metavar="TRUTH_DIR")
+    parser.add_argument("folder", nargs="?", type=Path, metavar="TRUTH_DIR")
     parser.add_argument("--out", type=Path, help="keep the frames here")
     arguments = parser.parse_args()
-    if arguments.out is not None:
-        arguments.out.mkdir(parents=True, exist_ok=True)
-        return run(arguments.folder, arguments.out)
-    with tempfile.TemporaryDirectory() as folder:
-        return run(arguments.folder, Path(folder))
+    folders = [arguments.folder]
+    if arguments.folder is None:
+        testdata = os.environ.get("HDRUSD_TESTDATA")
+        folders = [_OWN, Path(testdata) / "truth"] if testdata else [_OWN]
+    for folder in folders:
+        if not (folder / "expected.json").is_file():
+            parser.error(f"{folder}: no expected.json; want a folder of truth cases")
+    with tempfile.TemporaryDirectory() as temporary:
+        output = arguments.out or Path(temporary)
+        several = len(folders) > 1  # whose frames may have the same names
+        # A list, so that a failure in one set does not hide those of the next.
+        codes = [run(each, output / each.name if several else output) for each in folders]
+    return max(codes)
 
 
 def run(folder: Path, output: Path) -> int:
-    """Render and check all cases of ``folder``."""
+    """Render and check all cases of ``folder``; returns the exit code."""
+    output.mkdir(parents=True, exist_ok=True)
     cases = read_cases(folder)
     supported = [case for case in cases if not case.unsupported]
     ctx = create_context()

@@ -1,0 +1,76 @@
+"""The sky of a stage: ``read_ambient``, lux from everywhere alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from pxr import Sdf, Usd, UsdGeom
+
+from hdrusd.errors import SourceRef
+from hdrusd.report import Kind, Report
+from hdrusd.usd.light import read_dome
+
+RGB = tuple[float, float, float]
+API = "HdrusdAmbientAPI"
+
+
+def has_ambient(stage: Usd.Stage) -> bool:
+    """Whether the default prim states a sky."""
+    root = stage.GetDefaultPrim()
+    return bool(root) and bool(root.HasAPI(API))
+
+
+def read_ambient(
+    stage: Usd.Stage, domes: Iterable[Usd.Prim], time: Usd.TimeCode, report: Report
+) -> RGB:
+    """Illuminance per channel (lx) under open sky.
+
+    Our AmbientAPI, unless every dome that stands for it is hidden, and the domes
+    that it does not stand for. What is negative or not finite is left out.
+    """
+    total = np.zeros(3)
+    spoken_for: set[Sdf.Path] = set()
+    if has_ambient(stage):
+        root = stage.GetDefaultPrim()
+        targets = root.GetRelationship("photometric:ambient:light").GetTargets()
+        shown = [p for path in targets if (p := stage.GetPrimAtPath(path)) and _visible(p, time)]
+        stated = _stated(root, time)
+        if stated is not None:
+            spoken_for.update(targets)
+            if shown or not targets:
+                total += _sound(stated, root, report)
+    for prim in domes:
+        if prim.GetPath() not in spoken_for and _visible(prim, time):
+            lux = np.asarray(read_dome(prim, time, report) or (0.0, 0.0, 0.0))
+            total += _sound(lux, prim, report)
+    r, g, b = (float(v) for v in total)
+    return r, g, b
+
+
+def _stated(root: Usd.Prim, time: Usd.TimeCode) -> npt.NDArray[np.float64] | None:
+    """Lux per channel of the AmbientAPI; NaN for what is no number, None where it is silent."""
+    lux: Any = root.GetAttribute("photometric:ambient:illuminance").Get(time)
+    color: Any = root.GetAttribute("photometric:ambient:color").Get(time)
+    if lux is None:
+        return None
+    tint = np.ones(3) if color is None else np.ravel(np.asarray(color))
+    if not isinstance(lux, (int, float)) or tint.dtype.kind not in "fiu" or tint.size != 3:
+        return np.full(3, np.nan)
+    return np.asarray(float(lux) * tint.astype(np.float64))
+
+
+def _sound(lux: npt.NDArray[np.float64], prim: Usd.Prim, report: Report) -> npt.NDArray[np.float64]:
+    if np.isfinite(lux).all() and (lux >= 0.0).all():
+        return lux
+    place = SourceRef(Path(prim.GetStage().GetRootLayer().identifier))
+    text = "not finite or negative; left out"
+    report.add(Kind.INVALID, "light-invalid", place, str(prim.GetPath()), text)
+    return np.zeros(3)
+
+
+def _visible(prim: Usd.Prim, time: Usd.TimeCode) -> bool:
+    return bool(UsdGeom.Imageable(prim).ComputeVisibility(time) != UsdGeom.Tokens.invisible)
