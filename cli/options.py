@@ -57,7 +57,7 @@ def operator_options(function: F) -> F:
             "--operator",
             "-op",
             metavar="NAME",
-            help="Tone mapping operator. [default: the stage's, else reinhard02]",
+            help="Tone mapping operator. [default: reinhard02, or what the stage names]",
         ),
     ):
         function = option(function)

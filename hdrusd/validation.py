@@ -17,9 +17,9 @@ from typing import Any, Literal
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdShade, UsdValidation
 
+from hdrusd.colour import luminance
 from hdrusd.errors import SchemaRegistrationError
 from hdrusd.schemas import register
-from hdrusd.units import LUMINANCE_WEIGHTS
 from hdrusd.usd.lux import connection_end, input_source, is_light, light_kind, read_lux
 
 register()
@@ -221,7 +221,7 @@ def _disagreement(prim: Usd.Prim, placed: bool, times: list[Usd.TimeCode]) -> It
         said, reading = source.Get(time), read_lux(prim, time)
         if said is None or reading is None:
             continue
-        plain = _luminance(reading.intensity)
+        plain = luminance(reading.intensity)
         if not math.isclose(plain, said, rel_tol=AGREEMENT):
             yield _Fault(
                 "Disagreement",
@@ -295,7 +295,7 @@ def _emissive_texture(surface: Usd.Prim) -> Usd.Prim | None:
 def _emission_disagreement(
     surface: Usd.Prim,
     texture: Usd.Prim | None,
-    luminance: Usd.Attribute,
+    stated: Usd.Attribute,
     span: UsdValidation.ValidationTimeRange,
 ) -> Iterator[_Fault]:
     """Luminance against emissiveColor, or against the scale of its texture.
@@ -313,12 +313,12 @@ def _emission_disagreement(
             return  # 1 is not what stands for the luminance
         name, emissive = f"{texture.GetName()}.inputs:scale", input_source(texture, "scale")
         unauthored = (1.0, 1.0, 1.0)  # UsdUVTexture's default
-    for time in _times([emissive, luminance], span):
-        said = luminance.Get(time)
+    for time in _times([emissive, stated], span):
+        said = stated.Get(time)
         color = emissive.Get(time) if emissive else unauthored
         if said is None or color is None:
             continue
-        plain = _luminance(color[:3])  # a scale has alpha too
+        plain = luminance(color[:3])  # a scale has alpha too
         if not math.isclose(plain, said, rel_tol=AGREEMENT):
             yield _Fault(
                 "Disagreement",
@@ -367,15 +367,15 @@ def _ambient_disagreement(
 ) -> _Fault | None:
     """Channel by channel, relative to the illuminance."""
     color = (1.0, 1.0, 1.0) if tint is None else tuple(tint)
-    if not math.isclose(_luminance(color), 1.0, rel_tol=AGREEMENT):
-        text = f"photometric:ambient:color has a luminance of {_luminance(color):.6g}; want 1"
+    if not math.isclose(luminance(color), 1.0, rel_tol=AGREEMENT):
+        text = f"photometric:ambient:color has a luminance of {luminance(color):.6g}; want 1"
         return _Fault("ColorLuminance", text)
     reading = read_lux(dome, time)
     if reading is None:
         return None
     said = np.multiply(lux or 0.0, color)
     difference = np.abs(said - reading.intensity).max()
-    if difference <= AGREEMENT * max(_luminance(said), _luminance(reading.intensity)):
+    if difference <= AGREEMENT * max(luminance(said), luminance(reading.intensity)):
         return None
     return _Fault(
         "Disagreement",
@@ -424,10 +424,6 @@ def _times(
 def _authored(prim: Usd.Prim, name: str) -> bool:
     attribute = prim.GetAttribute(name)
     return bool(attribute) and bool(connection_end(attribute).HasAuthoredValue())
-
-
-def _luminance(color: Iterable[float]) -> float:
-    return sum(weight * c for weight, c in zip(LUMINANCE_WEIGHTS, color, strict=True))
 
 
 def _channels(numbers: Any) -> str:

@@ -27,6 +27,9 @@ FRAMES = "1:93x4"
 ROWS = (1, 45, 93)
 SIZE = (640, 360)
 
+#: Exit code after Ctrl-C, as of hdrusd.
+INTERRUPTED = 130
+
 #: Daylight for the look as it was: lux of the sun and of the sky.
 SUN, SKY = 50_000.0, 10_000.0
 
@@ -36,7 +39,15 @@ def run(*command: object) -> None:
     words = [str(word) for word in command]
     shown = " ".join(Path(words[0]).name if i == 0 else w for i, w in enumerate(words))
     print("$", shown, flush=True)  # before what the command says on standard error
-    subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
+    with subprocess.Popen(words, stdout=subprocess.DEVNULL) as command_line:
+        try:
+            code = command_line.wait()
+        except KeyboardInterrupt:  # Ctrl-C reaches the command too, which tidies up and says so
+            code = command_line.wait()
+            if code == 0:
+                raise
+    if code != 0:
+        raise subprocess.CalledProcessError(code, words)
 
 
 def write_daylight(out: Path) -> Path:
@@ -93,13 +104,15 @@ def main() -> int:
     try:
         demo(out)
     except subprocess.CalledProcessError as failed:
-        name = " ".join(Path(word).name for word in failed.cmd[:2])
-        print(f"demo: {name} ended with exit code {failed.returncode}", file=sys.stderr)
         # A signal is a negative number here, 128 and more for a shell.
-        return failed.returncode if failed.returncode > 0 else 128 - failed.returncode
+        code = failed.returncode if failed.returncode > 0 else 128 - failed.returncode
+        if code != INTERRUPTED:
+            name = " ".join(Path(word).name for word in failed.cmd[:2])
+            print(f"demo: {name} ended with exit code {code}", file=sys.stderr)
+        return code
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        return 130
+        return INTERRUPTED
     return 0
 
 
