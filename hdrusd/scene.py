@@ -7,7 +7,7 @@ The only thing that ``usd`` and ``gpu`` both know. Matrices act on row vectors
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Literal
 
@@ -18,23 +18,81 @@ RGB = tuple[float, float, float]
 Doubles = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 
-#: One light a row. A local light has ``w`` = 1 and stands at ``position``; a
-#: distant one has ``w`` = 0 and ``position`` is the unit vector towards it.
+#: Shapes of a local light. A POINT shines as one, whatever its radius; the others are
+#: area lights: Lambertian emitters of which every point counts.
+POINT, SPHERE, DISK, RECT, CYLINDER = range(5)
+
+#: One light a row; ``light_rows`` makes them with the values that change nothing. A
+#: local light has ``w`` = 1 and stands at ``position``; a distant one has ``w`` = 0 and
+#: ``position`` is the unit vector towards it.
 LIGHT = np.dtype(
     [
         ("position", "f8", 3),  # m, or unit vector towards a distant light
         ("w", "f8"),
-        ("intensity", "f8", 3),  # per channel: cd on the axis; lux for a distant light
+        # Per channel: cd on the axis, lux on a facing plane for a distant light. Of a
+        # cylinder: cd square to it. With a profile: the factor on its candela.
+        ("intensity", "f8", 3),
         ("radius", "f8"),  # m; the inverse square is not followed inside the lamp
-        ("axis", "f8", 3),  # unit vector, the way the light travels
+        ("axis", "f8", 3),  # unit vector, the way the light travels (local -Z)
         ("exponent", "f8"),  # UsdLux focus, OpenGL spot exponent
         ("inner", "f8"),  # rad: full up to here
         ("outer", "f8"),  # rad: nothing beyond; more than pi is no cone
+        # The light's local +X and +Y in the world. Area lights: half the sides of a
+        # RECT, two conjugate radii of a DISK, half the length of a CYLINDER (x), in m.
+        # Others: unit vectors; x is C = 0 of a profile, y is C = 90.
+        ("x", "f8", 3),
+        ("y", "f8", 3),
+        ("shape", "i4"),
+        ("profile", "i4"),  # number in RenderScene.profiles, or -1
+        ("diffuse", "f8"),  # factors of UsdLux on what it adds to the two reflections
+        ("specular", "f8"),
+        ("angle", "f8"),  # rad: half the angle that a distant light fills
+        ("link", "i4"),  # 0: shines on everything; n: on draws with bit n - 1 in ``links``
+        ("shadow", "i4"),  # 1: casts shadows
+        ("shadow_link", "i4"),  # 0: everything casts; n: draws with bit n - 1 in ``links``
+        ("key", "i8"),  # the same lamp over time has the same; told apart within a scene
     ]
 )
 
 #: Outer cone angle of a light without a cone.
 NO_CONE = 4.0
+
+
+def light_rows(count: int) -> npt.NDArray[np.void]:
+    """``count`` dark point lights without cone, profile or links, that cast shadows."""
+    rows = np.zeros(count, LIGHT)
+    rows["w"] = rows["diffuse"] = rows["specular"] = 1.0
+    rows["inner"] = rows["outer"] = NO_CONE
+    rows["axis"], rows["x"], rows["y"] = (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+    rows["profile"], rows["shadow"] = -1, 1
+    rows["key"] = np.arange(count)
+    return rows
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Profile:
+    """Candela of a luminaire over directions, on an even grid, (m, n) float32.
+
+    Rows are planes, columns the angles within one. ``planes`` and ``angles``: first and
+    last of each, rad. Outside them it is dark; a type C whose planes go all the way
+    round repeats its first plane as its last. Directions by type as in
+    photometry/profile.py.
+    """
+
+    candela: Floats
+    planes: tuple[float, float]
+    angles: tuple[float, float]
+    type: Literal["A", "B", "C"] = "C"
+    source: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Sky:
+    """A dome with a picture: cd/m2 of a direction = ``factor`` times the texel there."""
+
+    texture: TextureRef
+    factor: RGB
+    rotation: tuple[float, ...]  # nine: the dome's X, Y, Z axes in the world, row by row
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,24 +125,46 @@ class TextureUse:
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """What shader 1 needs of a surface. Reflectances in [0, 1], emission in cd/m2."""
+    """What shader 1 needs of a surface. Reflectances in [0, 1], emission in cd/m2.
 
+    A map replaces the value of its name. ``model`` is the highlight: "blinn" with
+    ``shininess``, for legacy materials, or "ggx" with ``roughness``, for UsdPreviewSurface.
+    """
+
+    model: Literal["blinn", "ggx"] = "blinn"
     diffuse: RGB = (0.18, 0.18, 0.18)
-    diffuse_map: TextureUse | None = None  # replaces ``diffuse``
+    diffuse_map: TextureUse | None = None
     vertex_color: str = ""  # primvar that multiplies the diffuse reflectance
-    specular: RGB = (0.0, 0.0, 0.0)
+    specular: RGB = (0.0, 0.0, 0.0)  # at normal incidence
+    specular_map: TextureUse | None = None
     shininess: float = 0.0
+    roughness: float = 0.5  # its square is the width of the GGX lobe
+    roughness_map: TextureUse | None = None
     metallic: float = 0.0  # moves the diffuse reflectance into the specular one
+    metallic_map: TextureUse | None = None
+    clearcoat: float = 0.0  # weight of a second lobe of 4 % at normal incidence
+    clearcoat_map: TextureUse | None = None
+    clearcoat_roughness: float = 0.01
+    clearcoat_roughness_map: TextureUse | None = None
     emission: RGB = (0.0, 0.0, 0.0)
-    emission_map: TextureUse | None = None  # replaces ``emission``
+    emission_map: TextureUse | None = None
     opacity: float = 1.0
     opacity_map: TextureUse | None = None
     opacity_threshold: float = 0.0
+    blend: bool = False  # lets through 1 - opacity of what is behind
+    presence: bool = False  # its opacity takes the highlight away too (opacityMode)
+    occlusion: float = 1.0  # share of the ambient light that arrives
+    occlusion_map: TextureUse | None = None
+    normal_map: TextureUse | None = None  # tangent space, after scale and bias
+
+    def maps(self) -> dict[str, TextureUse]:
+        """The maps in use by the names of their fields, in the order of the fields."""
+        found = {f.name: getattr(self, f.name) for f in fields(self) if f.name.endswith("_map")}
+        return {name: use for name, use in found.items() if use is not None}
 
     def uv_sets(self) -> list[str]:
         """The texture coordinate sets in use, in slot order without repeats."""
-        uses = (self.diffuse_map, self.emission_map, self.opacity_map)
-        return list(dict.fromkeys(use.uv_set for use in uses if use is not None))
+        return list(dict.fromkeys(use.uv_set for use in self.maps().values()))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,6 +191,9 @@ class Draw:
     material: int
     transforms: Doubles  # (k, 4, 4), to world metres, row vectors
     double_sided: bool = False
+    moving: bool = False  # its points or its places may change from frame to frame
+    links: int = 0  # bits of the light and shadow links that name it (LIGHT)
+    casts: bool = True  # whether it casts shadows
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +253,8 @@ class RenderScene:
     """Everything one frame needs."""
 
     lights: npt.NDArray[np.void] = field(default_factory=lambda: np.zeros(0, LIGHT))
+    profiles: tuple[Profile, ...] = ()
+    skies: tuple[Sky, ...] = ()  # beside ``ambient``
     draws: tuple[Draw, ...] = ()
     materials: tuple[Material, ...] = ()
     ambient: RGB = (0.0, 0.0, 0.0)  # lux, unobstructed, from everywhere alike

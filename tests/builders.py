@@ -16,7 +16,7 @@ import hdrusd.usd  # noqa: F401 (registers the schemas before the first stage)
 from hdrusd.errors import SourceRef
 from hdrusd.images import write_png
 from hdrusd.legacy.scene import Image, LegacyScene, Light, Material, Mesh, Node, Texture
-from hdrusd.scene import LIGHT, NO_CONE
+from hdrusd.scene import light_rows
 
 #: Where everything made here says that it comes from.
 HERE = SourceRef(Path("street.osgt"), 7)
@@ -79,9 +79,8 @@ def one_square(**parts: Any) -> LegacyScene:
 
 def light_row(intensity: float | tuple[float, float, float] = 1.0, **changes: Any) -> Any:
     """A (1,) array of ``scene.LIGHT``: at the origin, 5 cm, no cone, shining along -Z."""
-    row = np.zeros(1, LIGHT)
-    row["w"], row["radius"], row["axis"] = 1.0, 0.05, (0.0, 0.0, -1.0)
-    row["intensity"], row["inner"], row["outer"] = intensity, NO_CONE, NO_CONE
+    row = light_rows(1)
+    row["radius"], row["intensity"] = 0.05, intensity
     for name, value in changes.items():
         row[name] = value
     return row

@@ -16,7 +16,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.report import Kind, Report
-from hdrusd.scene import LIGHT, NO_CONE, Camera, Draw, Geometry, RenderScene
+from hdrusd.scene import LIGHT, Camera, Draw, Geometry, RenderScene, light_rows
 from hdrusd.units import dome_luminance
 from hdrusd.usd.ambient import has_ambient, read_ambient
 from hdrusd.usd.bindings import Bindings, Piece
@@ -354,10 +354,9 @@ def _merge(draws: list[Draw]) -> Iterable[Draw]:
 
 
 def _default_light(camera: Camera) -> npt.NDArray[np.void]:
-    row = np.zeros(1, LIGHT)
+    row = light_rows(1)
     row["position"], row["axis"] = camera.back, -np.asarray(camera.back)
-    row["intensity"] = DEFAULT_SKY
-    row["inner"] = row["outer"] = NO_CONE
+    row["intensity"], row["w"], row["shadow"] = DEFAULT_SKY, 0.0, 0
     return row
 
 

@@ -17,7 +17,7 @@ from pxr import Gf, Sdf, Usd, UsdLux
 from hdrusd.errors import SourceRef
 from hdrusd.photometry.light import PhotometricLight
 from hdrusd.report import Kind, Report
-from hdrusd.scene import LIGHT, NO_CONE
+from hdrusd.scene import NO_CONE, light_rows
 from hdrusd.units import LUMINANCE_WEIGHTS, distant_luminance, dome_luminance, sphere_luminance
 from hdrusd.usd.lux import LuxReading, input_number, read_lux
 
@@ -137,7 +137,7 @@ def read_light_row(
         return None
     strength, color = _photometric(prim, reading, time, report)
     _note_unused(prim, time, report)
-    row = np.zeros(1, LIGHT)
+    row = light_rows(1)
     rotation = world.ExtractRotationMatrix()
     axis = -np.array(rotation.GetRow(2), np.float64)
     axis /= max(float(np.linalg.norm(axis)), 1e-12)

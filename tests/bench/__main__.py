@@ -30,7 +30,7 @@ from hdrusd.maps import MapWriter
 from hdrusd.photometry.reflectance import reflectance_table
 from hdrusd.render import Job, Renderer, render_sequence
 from hdrusd.report import Report
-from hdrusd.scene import LIGHT, NO_CONE, RenderScene
+from hdrusd.scene import RenderScene, light_rows
 from hdrusd.tonemap.operator import OPERATORS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -76,13 +76,11 @@ def street_lights(scene: RenderScene, count: int) -> np.ndarray:
     rng = np.random.default_rng(3)
     points = np.concatenate([d.transforms[:, 3, :3] for d in scene.draws])
     low, high = points.min(axis=0), points.max(axis=0)
-    lights = np.zeros(count, LIGHT)
+    lights = light_rows(count)
     lights["position"] = rng.uniform(low, high, (count, 3))
     lights["position"][:, 2] = 8.0
-    lights["w"], lights["radius"] = 1.0, 0.1
+    lights["radius"] = 0.1
     lights["intensity"] = 3000.0
-    lights["axis"] = (0.0, 0.0, -1.0)
-    lights["inner"] = lights["outer"] = NO_CONE
     lights["inner"][::5], lights["outer"][::5] = 0.6, 1.0
     return lights
 

@@ -13,8 +13,6 @@ import numpy.typing as npt
 from hdrusd.gpu.hdr import HdrRenderer
 from hdrusd.gpu.program import Programs
 from hdrusd.scene import (
-    LIGHT,
-    NO_CONE,
     Camera,
     Draw,
     Geometry,
@@ -22,6 +20,7 @@ from hdrusd.scene import (
     Material,
     RenderScene,
     TextureRef,
+    light_rows,
 )
 
 Array = npt.NDArray[Any]
@@ -110,9 +109,8 @@ def look(
 
 def lights(*rows: Mapping[str, Any]) -> npt.NDArray[np.void]:
     """Lights by their LIGHT fields; a plain white one of 1 cd at the origin otherwise."""
-    table = np.zeros(len(rows), LIGHT)
-    table["w"], table["intensity"], table["axis"] = 1.0, 1.0, (0.0, 0.0, -1.0)
-    table["inner"] = table["outer"] = NO_CONE
+    table = light_rows(len(rows))
+    table["intensity"] = 1.0
     for row, fields in zip(table, rows, strict=True):
         for name, value in fields.items():
             row[name] = value
