@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.photometry.light import inverse_edge, inverse_square
-from hdrusd.scene import NO_CONE, Camera, Draw, Geometry
+from hdrusd.scene import Camera, Draw, Geometry
 
 Floats = npt.NDArray[np.float32]
 
@@ -74,82 +71,3 @@ def mirrored(draw: Draw) -> npt.NDArray[np.bool_]:
     # Written out: a general determinant takes longer than the whole draw.
     (a, b, c), (d, e, f), (g, h, i) = draw.transforms[:, :3, :3].transpose(1, 2, 0)
     return np.asarray(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class LightClass:
-    """Lights that one variant of light.frag adds up, and as what they reach it."""
-
-    define: str
-    rows: int  # texels (of 4 floats) a light
-    batch: int  # lights an instance: 31 flat vec4 are what OpenGL 3.3 grants between stages
-    texels: Floats  # (n + 1, rows, 4); the last is dark and fills the last batch
-
-    def draws(self) -> list[tuple[int, int, int]]:
-        """(first light, lights a batch, batches): full batches, then the least that holds the rest.
-
-        A batch costs as much as its size, lights or none.
-        """
-        full, rest = divmod(len(self.texels) - 1, self.batch)
-        draws = [(0, self.batch, full)] if full else []
-        if rest:
-            size = min(size for size in (*_SMALL_BATCHES, self.batch) if size >= rest)
-            draws.append((full * self.batch, size, 1))
-        return draws
-
-
-#: Sizes that light.frag has beside the full one of each class.
-_SMALL_BATCHES = (1, 4)
-
-
-def light_classes(lights: npt.NDArray[np.void], camera: Camera) -> list[LightClass]:
-    """The lights by what they need, in the layouts of light.frag; empty classes left out.
-
-    Dark lights are left out: they add nothing. Positions are relative to the eye.
-    """
-    lit = lights[np.any(lights["intensity"] != 0.0, axis=1)]
-    focus = lit["exponent"] > 0.0
-    cone = (lit["outer"] < NO_CONE) & ~focus & (lit["w"] > 0.0)
-    kinds = (
-        LightClass("PLAIN", 2, 15, _plain(lit[~cone & ~focus], camera)),
-        LightClass("CONES", 3, 10, _cones(lit[cone], camera)),
-        LightClass("FOCUS", 4, 7, _focus(lit[focus], camera)),
-    )
-    return [kind for kind in kinds if len(kind.texels) > 1]
-
-
-def _plain(lights: npt.NDArray[np.void], camera: Camera) -> Floats:
-    texels = np.zeros((len(lights) + 1, 2, 4))
-    texels[-1] = _DARK[:2]
-    texels[:-1, 0, :3], texels[:-1, 0, 3] = _relative(lights, camera), lights["w"]
-    texels[:-1, 1, :3], texels[:-1, 1, 3] = lights["intensity"], inverse_square(lights["radius"])
-    return texels.astype(np.float32)
-
-
-def _cones(lights: npt.NDArray[np.void], camera: Camera) -> Floats:
-    texels = np.zeros((len(lights) + 1, 3, 4))
-    texels[-1] = _DARK[:3]
-    texels[:-1, 0, :3] = _relative(lights, camera)
-    texels[:-1, 0, 3] = inverse_square(lights["radius"])
-    texels[:-1, 1, :3], texels[:-1, 1, 3] = lights["intensity"], lights["inner"]
-    texels[:-1, 2, :3] = lights["axis"]
-    texels[:-1, 2, 3] = inverse_edge(lights["inner"], lights["outer"])
-    return texels.astype(np.float32)
-
-
-def _focus(lights: npt.NDArray[np.void], camera: Camera) -> Floats:
-    texels = np.zeros((len(lights) + 1, 4, 4))
-    texels[-1] = _DARK
-    texels[:-1, :2] = _plain(lights, camera)[:-1]
-    texels[:-1, 2, :3], texels[:-1, 2, 3] = lights["axis"], lights["exponent"]
-    texels[:-1, 3, 0] = lights["inner"]
-    texels[:-1, 3, 1] = inverse_edge(lights["inner"], lights["outer"])
-    return texels.astype(np.float32)
-
-
-def _relative(lights: npt.NDArray[np.void], camera: Camera) -> npt.NDArray[np.float64]:
-    return np.asarray(lights["position"] - lights["w"][:, None] * np.asarray(camera.eye))
-
-
-#: Rows of a light that is not there: dark, and nowhere near a surface.
-_DARK = np.array([[0.0, 0.0, 1e6, 1.0], [0, 0, 0, 1], [0, 0, 1, 1], [0, 1, 0, 0]])

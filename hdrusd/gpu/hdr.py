@@ -12,17 +12,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Literal
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.gpu.buffers import light_classes
+from hdrusd.gpu.lights import LightPass
 from hdrusd.gpu.program import Programs
-from hdrusd.gpu.surfaces import SurfacePass, set_used
+from hdrusd.gpu.surfaces import SurfacePass
 from hdrusd.gpu.textures import TextureCache
-from hdrusd.scene import Camera, ImageData, RenderScene, TextureRef
+from hdrusd.scene import ImageData, RenderScene, TextureRef
 from hdrusd.units import TEXTURE_GAMMA
 
 Reflection = Literal["lambert", "petit2010"]
@@ -61,7 +61,7 @@ class HdrRenderer:
         depth = ctx.depth_texture(size)
         self._gbuffer = ctx.framebuffer(self._layers, depth)
         self._frame = ctx.framebuffer([self.hdr], depth)
-        self._passes: dict[moderngl.Program, moderngl.VertexArray] = {}
+        self.lights = LightPass(ctx, programs, size, self.scale)
 
     @property
     def hdr(self) -> moderngl.Texture:
@@ -99,54 +99,4 @@ class HdrRenderer:
 
     def add_lights(self, scene: RenderScene) -> None:
         """Step two: every light on every pixel that shows a surface."""
-        ctx = self.ctx
-        self._frame.use()
-        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
-        ctx.depth_func = ">"
-        ctx.blend_func = moderngl.ONE, moderngl.ONE
-        self._frame.depth_mask = False
-        for unit, layer in enumerate(self._layers[:-1]):
-            layer.use(unit)
-        # A software device runs both sides of a branch, so gloss is a variant of the program.
-        glossy = any(any(m.specular) or m.metallic > 0.0 for m in scene.materials)
-        for kind in light_classes(scene.lights, scene.camera):
-            rows = len(kind.texels)
-            table = ctx.texture((kind.rows, rows), 4, kind.texels, dtype="f4")
-            table.filter = (moderngl.NEAREST, moderngl.NEAREST)
-            table.use(len(LAYERS))
-            for first, batch, batches in kind.draws():
-                defines: dict[str, str | int | float] = {
-                    kind.define: 1,
-                    "ROWS": kind.rows,
-                    "BATCH": batch,
-                    "ALL": f"ALL{batch}",
-                }
-                program = self.programs.get(
-                    "gpu/shaders/light.vert",
-                    "gpu/shaders/light.frag",
-                    defines | ({"GLOSSY": 1} if glossy else {}),
-                )
-                uniforms = {"lights": len(LAYERS), "first": first, "count": rows - 1}
-                uniforms |= {name: unit for unit, name in enumerate(LAYERS[:-1])}
-                shared = {"lambert_scale": self.scale} | window_uniforms(scene.camera)
-                for name, value in (uniforms | shared).items():
-                    set_used(program, name, value)
-                if program not in self._passes:
-                    self._passes[program] = ctx.vertex_array(program, [])
-                self._passes[program].render(moderngl.TRIANGLES, vertices=3, instances=batches)
-            table.release()
-        self._frame.depth_mask = True
-        ctx.enable_only(moderngl.NOTHING)
-
-
-def window_uniforms(camera: Camera) -> dict[str, Any]:
-    """What gbuffer.glsl needs to find a pixel's place again: its ray, in world directions."""
-    right, up = np.asarray(camera.right), np.asarray(camera.up)
-    left, far_right, bottom, top = camera.window
-    return {
-        "ray_origin": tuple(left * right + bottom * up),
-        "ray_x": tuple((far_right - left) * right),
-        "ray_y": tuple((top - bottom) * up),
-        "forward": tuple(-np.asarray(camera.back)),
-        "orthographic": camera.orthographic,
-    }
+        self.lights.add(scene, dict(zip(LAYERS[:-1], self._layers[:-1], strict=True)), self._frame)

@@ -2,69 +2,130 @@
 // added up over one batch of lights. Result in cd/m2.
 #include "photometry/light.glsl"
 #include "photometry/reflectance.glsl"
+// MICROFACET
 #include "gpu/shaders/gbuffer.glsl"
 
 in vec2 window;
 flat in vec4 data[BATCH * ROWS];
 layout(location = 0) out vec4 hdr;
 
+uniform float lambert_scale;  // 1/pi, or 1 for petit2010
+
+// What of a surface every light needs.
+struct Surface {
+    vec3 p;          // m, relative to the eye
+    vec3 n;          // unit normal
+    vec3 v;          // unit vector to the eye
+    float nv;
+    float gloss;     // code of g_diffuse.w: shininess, or minus alpha
+    float links;     // bits
+};
+
+// What of a light arrives there.
+struct Arrival {
+    vec3 lux;        // on the surface, unobstructed or not, as far as diffuse reflection goes
+    vec3 gloss_lux;  // the same for the highlight
+    vec3 l;          // unit vector that the highlight takes for the light's direction
+    float nl;
+};
+
+#if defined(SPECIAL)
+// SPECIAL_INCLUDE
+#define ARRIVAL(i) Arrival a = special_arrival(s, (i) * ROWS);
+#else
 // Rows of a light: position, w | intensity rgb, 1/radius^2 | axis, exponent | inner, 1/width, 0, 0.
 // With CONES (and no exponent): position, 1/radius^2 | intensity rgb, inner | axis, 1/width.
 #if defined(FOCUS)
 #define POSITION(i) data[(i) * ROWS].xyz, data[(i) * ROWS].w
 #define INVERSE_RADIUS2(i) data[(i) * ROWS + 1].w
-#define SHAPE(i) * cone_factor(-dot(l, data[(i) * ROWS + 2].xyz), data[(i) * ROWS + 3].x, \
+#define SHAPE(i) * cone_factor(-dot(a.l, data[(i) * ROWS + 2].xyz), data[(i) * ROWS + 3].x, \
                                data[(i) * ROWS + 3].y) \
-                 * focus_factor(-dot(l, data[(i) * ROWS + 2].xyz), data[(i) * ROWS + 2].w)
+                 * focus_factor(-dot(a.l, data[(i) * ROWS + 2].xyz), data[(i) * ROWS + 2].w)
 #elif defined(CONES)
 #define POSITION(i) data[(i) * ROWS].xyz, 1.0
 #define INVERSE_RADIUS2(i) data[(i) * ROWS].w
-#define SHAPE(i) * cone_factor(-dot(l, data[(i) * ROWS + 2].xyz), data[(i) * ROWS + 1].w, \
+#define SHAPE(i) * cone_factor(-dot(a.l, data[(i) * ROWS + 2].xyz), data[(i) * ROWS + 1].w, \
                                data[(i) * ROWS + 2].w)
 #else
 #define POSITION(i) data[(i) * ROWS].xyz, data[(i) * ROWS].w
 #define INVERSE_RADIUS2(i) data[(i) * ROWS + 1].w
 #define SHAPE(i)
 #endif
+#define ARRIVAL(i) \
+    Arrival a; \
+    a.l = light_vector(POSITION(i), s.p); \
+    float inverse_d = inversesqrt(max(dot(a.l, a.l), 1e-20)); \
+    a.l *= inverse_d; \
+    a.nl = dot(s.n, a.l); \
+    a.lux = data[(i) * ROWS + 1].xyz * (illuminance(a.nl, inverse_d * inverse_d, INVERSE_RADIUS2(i)) SHAPE(i)); \
+    a.gloss_lux = a.lux;
+#endif
 
-#define LIGHT(i) \
-    vec3 l = light_vector(POSITION(i), p); \
-    float inverse_d = inversesqrt(max(dot(l, l), 1e-20)); \
-    l *= inverse_d; \
-    float nl = dot(n, l); \
-    vec3 lux = data[(i) * ROWS + 1].xyz * (illuminance(nl, inverse_d * inverse_d, INVERSE_RADIUS2(i)) SHAPE(i));
+// The highlight: BLINN, GGX or both in a tile; sums of luminance.
+#if defined(BLINN) || defined(GGX)
+vec3 ks;
 
-#define DIFFUSE(i) { LIGHT(i) sum += lux; }
-#define GLOSS(i) { LIGHT(i) sum += lux; \
-    gloss += lux * blinn_phong(half_cosine(nl, nv, dot(l, v)), shininess, lambert_scale); }
+#ifdef COATED
+vec2 coat;  // weight, alpha
+#endif
+vec3 highlight(Surface s, Arrival a)
+{
+    float vl = dot(s.v, a.l);
+    float nh = half_cosine(a.nl, s.nv, vl);
+    vec3 sum = vec3(0.0);
+#ifdef GGX
+    vec3 ggx = ggx_lobe(ks, f90, -s.gloss, a.nl, s.nv, nh, vl, lambert_scale);
+#ifdef COATED
+    ggx = coated(ggx, coat, a.nl, s.nv, nh, vl, lambert_scale);
+#endif
+#endif
+#if defined(BLINN) && defined(GGX)
+    return a.gloss_lux * (s.gloss < 0.0 ? ggx : ks * blinn_phong(nh, s.gloss, lambert_scale));
+#elif defined(GGX)
+    return a.gloss_lux * ggx;
+#else
+    return a.gloss_lux * ks * blinn_phong(nh, s.gloss, lambert_scale);
+#endif
+}
+#define ADD(i) { ARRIVAL(i) sum += a.lux; gloss += highlight(s, a); }
+#else
+#define ADD(i) { ARRIVAL(i) sum += a.lux; }
+#endif
 
 // ALL, one of these, applies X to each light of the batch.
 #define ALL1(X) X(0)
-#define ALL4(X) ALL1(X) X(1) X(2) X(3)
-#define ALL7(X) ALL4(X) X(4) X(5) X(6)
-#define ALL10(X) ALL7(X) X(7) X(8) X(9)
+#define ALL3(X) ALL1(X) X(1) X(2)
+#define ALL4(X) ALL3(X) X(3)
+#define ALL5(X) ALL4(X) X(4)
+#define ALL7(X) ALL5(X) X(5) X(6)
+#define ALL8(X) ALL7(X) X(7)
+#define ALL10(X) ALL8(X) X(8) X(9)
 #define ALL15(X) ALL10(X) X(10) X(11) X(12) X(13) X(14)
-
-uniform float lambert_scale;  // 1/pi, or 1 for petit2010
 
 void main()
 {
+    Surface s;
     float depth;
-    vec3 n = g_normal_at(window, depth);
-    vec3 p = g_position_at(window, depth);
+    s.n = g_normal_at(window, depth);
+    s.p = g_position_at(window, depth);
+    s.v = g_toward_eye(s.p);
+    s.nv = dot(s.n, s.v);
     vec4 diffuse = textureLod(g_diffuse, window, 0.0);
-    vec3 rho = diffuse.rgb;
-    vec3 sum = vec3(0.0);
-#ifdef GLOSSY
-    float shininess = diffuse.w;
-    vec3 gloss = vec3(0.0);
-    vec3 v = g_toward_eye(p);
-    float nv = dot(n, v);
-    ALL(GLOSS)
-    hdr = vec4(lambert(rho, sum, lambert_scale)
-               + textureLod(g_specular, window, 0.0).rgb * gloss, 0.0);
-#else
-    ALL(DIFFUSE)
-    hdr = vec4(lambert(rho, sum, lambert_scale), 0.0);
+    s.gloss = diffuse.w;
+    vec3 sum = vec3(0.0), gloss = vec3(0.0);
+#if defined(LINKED) || defined(COATED)
+    vec4 extra = textureLod(g_extra, window, 0.0);
+    s.links = extra.z;
 #endif
+#if defined(BLINN) || defined(GGX)
+    vec4 specular = textureLod(g_specular, window, 0.0);
+    ks = specular.rgb;
+
+
+#ifdef COATED
+    coat = extra.xy;
+#endif
+#endif
+    ALL(ADD)
+    hdr = vec4(lambert(diffuse.rgb, sum, lambert_scale) + gloss, 0.0);
 }

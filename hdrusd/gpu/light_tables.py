@@ -1,0 +1,185 @@
+"""Lights in the layouts that light.frag reads: a class of lights, a table, a variant.
+
+What a light needs in a pixel decides its class, for a software device runs every term
+that a shader has. Most lamps are points, perhaps with a beam, and travel light: two to
+four texels. All others (area lights, profiles, shadows, links, factors) have six texels
+and those of their extras.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hdrusd.photometry.light import inverse_edge, inverse_square
+from hdrusd.scene import CYLINDER, DISK, NO_CONE, POINT, RECT, SPHERE, Camera
+
+Floats = npt.NDArray[np.float32]
+Lights = npt.NDArray[np.void]
+
+#: vec4 that OpenGL 3.3 grants between stages, less the one of the window position.
+_VARYINGS = 31
+
+#: Batches smaller than the full one, so that a rest of lights costs no more than it must.
+_SMALL_BATCHES = (1, 4, 8)
+
+_SHAPES = {SPHERE: "SPHERE", DISK: "DISK", RECT: "RECT", CYLINDER: "CYLINDER"}
+
+#: A ball up to this radius (m) shines as a point does: what it loses where the horizon of
+#: a surface cuts it is below radius / distance of the light at normal incidence.
+SMALL_SPHERE = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Extras:
+    """What other parts of the renderer know of each light; (n, k, 4) float32 texels.
+
+    ``shadow_kind``: (n,) names of #defines, "" for a light without shadows.
+    """
+
+    shadow_kind: npt.NDArray[np.str_]
+    shadow: Floats
+    profile: Floats
+    profile_kind: npt.NDArray[np.str_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LightClass:
+    """Lights that one variant of light.frag adds up."""
+
+    defines: tuple[str, ...]
+    members: npt.NDArray[np.intp]  # (n,) their numbers in the scene
+    texels: Floats  # (n + 1, rows, 4); the last is dark and fills batches
+
+    @property
+    def rows(self) -> int:
+        """Texels a light."""
+        return self.texels.shape[1]
+
+    @property
+    def batches(self) -> tuple[int, ...]:
+        """Sizes in which the lights of a tile are drawn, ascending."""
+        full = _VARYINGS // self.rows
+        return (*(size for size in _SMALL_BATCHES if size < full), full)
+
+
+def light_classes(lights: Lights, camera: Camera, extras: Extras | None = None) -> list[LightClass]:
+    """The lights by what they need; dark ones are left out: they add nothing.
+
+    Positions in the tables are relative to the eye.
+    """
+    lit = np.flatnonzero(np.any(lights["intensity"] != 0.0, axis=1))
+    chosen = lights[lit]
+    kinds = _kinds(chosen, None if extras is None else _of(extras, lit))
+    names, which = np.unique(kinds, return_inverse=True)
+    classes = []
+    for number, name in enumerate(names):
+        members = lit[which == number]
+        texels = _texels(lights[members], camera, str(name))
+        defines = tuple(str(name).split())
+        if extras is not None:
+            own = _of(extras, members)
+            parts = [texels]
+            if any(define.startswith("SHADOW") for define in defines):
+                parts.append(_with_dark(own.shadow))
+            if any(define.startswith("PROFILE") for define in defines):
+                parts.append(_with_dark(own.profile))
+            texels = np.concatenate(parts, axis=1)
+        classes.append(LightClass(defines, members, np.ascontiguousarray(texels, np.float32)))
+    return classes
+
+
+def _of(extras: Extras, which: npt.NDArray[np.intp]) -> Extras:
+    return Extras(
+        extras.shadow_kind[which],
+        extras.shadow[which],
+        extras.profile[which],
+        extras.profile_kind[which],
+    )
+
+
+def _with_dark(texels: Floats) -> Floats:
+    return np.concatenate([texels, texels[-1:]])
+
+
+def _kinds(lights: Lights, extras: Extras | None) -> npt.NDArray[np.str_]:
+    """(n,) the #defines of each light, in words."""
+    local = lights["w"] > 0.0
+    focus = (lights["exponent"] > 0.0) & local
+    cone = (lights["outer"] < NO_CONE) & local
+    shape = np.where(local, lights["shape"], POINT)
+    shape = np.where((shape == SPHERE) & (lights["radius"] <= SMALL_SPHERE), POINT, shape)
+    plain = (shape == POINT) & (lights["diffuse"] == 1.0) & (lights["specular"] == 1.0)
+    plain &= (lights["link"] == 0) & ~((lights["angle"] > 0.0) & ~local)
+    if extras is not None:
+        plain &= (extras.shadow_kind == "") & (extras.profile_kind == "")
+    simple = np.where(focus, "FOCUS", np.where(cone, "CONES", "PLAIN"))
+    words = np.full(len(lights), "SPECIAL", dtype="U80")
+    words = np.where(focus | cone, np.char.add(words, " BEAM"), words)
+    for number, name in _SHAPES.items():
+        words = np.where(shape == number, np.char.add(words, f" {name}"), words)
+    words = np.where(~local & (lights["angle"] > 0.0), np.char.add(words, " DISTANT"), words)
+    words = np.where(lights["link"] > 0, np.char.add(words, " LINKED"), words)
+    if extras is not None:
+        for kind in (extras.profile_kind, extras.shadow_kind):
+            words = np.where(kind != "", np.char.add(np.char.add(words, " "), kind), words)
+    return np.asarray(np.where(plain, simple, words))
+
+
+def _texels(lights: Lights, camera: Camera, kind: str) -> npt.NDArray[np.float64]:
+    if kind == "PLAIN":
+        return _plain(lights, camera)
+    if kind == "CONES":
+        return _cones(lights, camera)
+    if kind == "FOCUS":
+        return _focus(lights, camera)
+    texels = np.zeros((len(lights) + 1, 6, 4))
+    texels[:, :2] = _plain(lights, camera)
+    texels[-1, 2:] = [[0, 0, 1, 1], [1, 0, 0, 0], [0, 1, 0, 1], [1, 1, 0, 0]]
+    texels[:-1, 2, :3], texels[:-1, 2, 3] = lights["axis"], lights["exponent"]
+    texels[:-1, 3, :3], texels[:-1, 3, 3] = lights["x"], lights["inner"]
+    texels[:-1, 4, :3] = lights["y"]
+    texels[:-1, 4, 3] = inverse_edge(lights["inner"], lights["outer"])
+    texels[:-1, 5, 0], texels[:-1, 5, 1] = lights["diffuse"], lights["specular"]
+    texels[:-1, 5, 2] = lights["link"]
+    texels[:-1, 5, 3] = np.where(lights["w"] > 0.0, lights["radius"], np.tan(lights["angle"]))
+    return texels
+
+
+def _plain(lights: Lights, camera: Camera) -> npt.NDArray[np.float64]:
+    texels = np.zeros((len(lights) + 1, 2, 4))
+    texels[-1] = _DARK[:2]
+    texels[:-1, 0, :3], texels[:-1, 0, 3] = _relative(lights, camera), lights["w"]
+    texels[:-1, 1, :3], texels[:-1, 1, 3] = lights["intensity"], inverse_square(lights["radius"])
+    return texels
+
+
+def _cones(lights: Lights, camera: Camera) -> npt.NDArray[np.float64]:
+    texels = np.zeros((len(lights) + 1, 3, 4))
+    texels[-1] = _DARK[:3]
+    texels[:-1, 0, :3] = _relative(lights, camera)
+    texels[:-1, 0, 3] = inverse_square(lights["radius"])
+    texels[:-1, 1, :3], texels[:-1, 1, 3] = lights["intensity"], lights["inner"]
+    texels[:-1, 2, :3] = lights["axis"]
+    texels[:-1, 2, 3] = inverse_edge(lights["inner"], lights["outer"])
+    return texels
+
+
+def _focus(lights: Lights, camera: Camera) -> npt.NDArray[np.float64]:
+    texels = np.zeros((len(lights) + 1, 4, 4))
+    texels[-1] = _DARK
+    texels[:, :2] = _plain(lights, camera)
+    texels[:-1, 2, :3], texels[:-1, 2, 3] = lights["axis"], lights["exponent"]
+    texels[:-1, 3, 0] = lights["inner"]
+    texels[:-1, 3, 1] = inverse_edge(lights["inner"], lights["outer"])
+    return texels
+
+
+def _relative(lights: Lights, camera: Camera) -> npt.NDArray[np.float64]:
+    return np.asarray(lights["position"] - lights["w"][:, None] * np.asarray(camera.eye))
+
+
+#: Rows of a light that is not there: dark, and nowhere near a surface.
+_DARK = np.array([[0.0, 0.0, 1e6, 1.0], [0, 0, 0, 1], [0, 0, 1, 1], [0, 1, 0, 0]])

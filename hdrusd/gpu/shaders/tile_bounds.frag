@@ -1,0 +1,34 @@
+// What a tile of the screen shows: nearest and farthest surface, and its highlights.
+uniform sampler2D g_normal;    // unit normal; distance along the view axis, m
+uniform sampler2D g_diffuse;   // reflectance; gloss code
+uniform sampler2D g_specular;  // reflectance at normal incidence; metallic
+layout(location = 0) out vec4 bounds;  // least, largest distance (m); width of the narrowest lobe;
+                                       // 1 Blinn-Phong + 2 GGX
+
+void main()
+{
+    ivec2 size = textureSize(g_normal, 0);
+    ivec2 first = ivec2(gl_FragCoord.xy) * TILE;
+    ivec2 last = min(first + TILE, size);
+    vec2 depth = vec2(1e30, -1.0);
+    float lobe = 4.0;
+    bool blinn = false, ggx = false;
+    for (int y = first.y; y < last.y; ++y)
+        for (int x = first.x; x < last.x; ++x) {
+            ivec2 at = ivec2(x, y);
+            float z = texelFetch(g_normal, at, 0).w;
+            bool seen = z > 0.0;
+            depth = seen ? vec2(min(depth.x, z), max(depth.y, z)) : depth;
+#ifdef GLOSSY
+            vec3 ks = texelFetch(g_specular, at, 0).rgb;
+            float code = texelFetch(g_diffuse, at, 0).w;
+            seen = seen && max(ks.r, max(ks.g, ks.b)) > 0.0;
+            ggx = ggx || (seen && code < 0.0);
+            blinn = blinn || (seen && code >= 0.0);
+            // Half the width of the lobe over the half vector, rad: alpha, or sqrt(2 / (n + 2)).
+            float width = code < 0.0 ? -code : sqrt(2.0 / (code + 2.0));
+            lobe = seen ? min(lobe, width) : lobe;
+#endif
+        }
+    bounds = vec4(depth, lobe, (blinn ? 1.0 : 0.0) + (ggx ? 2.0 : 0.0));
+}
