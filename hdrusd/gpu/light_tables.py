@@ -23,7 +23,8 @@ Lights = npt.NDArray[np.void]
 _VARYINGS = 31
 
 #: Batches smaller than the full one, so that a rest of lights costs no more than it must.
-_SMALL_BATCHES = (1, 4, 8)
+#: Few, for each is a program to compile.
+_SMALL_BATCHES = (1, 4)
 
 _SHAPES = {SPHERE: "SPHERE", DISK: "DISK", RECT: "RECT", CYLINDER: "CYLINDER"}
 
@@ -47,7 +48,7 @@ class Extras:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LightClass:
-    """Lights that one variant of light.frag adds up."""
+    """Lights that light.frag treats alike."""
 
     defines: tuple[str, ...]
     members: npt.NDArray[np.intp]  # (n,) their numbers in the scene
@@ -56,13 +57,13 @@ class LightClass:
     @property
     def rows(self) -> int:
         """Texels a light."""
-        return self.texels.shape[1]
+        return int(self.texels.shape[1])
 
     @property
     def batches(self) -> tuple[int, ...]:
-        """Sizes in which the lights of a tile are drawn, ascending."""
+        """How many of them a batch may hold, ascending."""
         full = _VARYINGS // self.rows
-        return (*(size for size in _SMALL_BATCHES if size < full), full)
+        return (*(size for size in _SMALL_BATCHES if 2 * size <= full), full)
 
 
 def light_classes(lights: Lights, camera: Camera, extras: Extras | None = None) -> list[LightClass]:
@@ -81,7 +82,7 @@ def light_classes(lights: Lights, camera: Camera, extras: Extras | None = None) 
         defines = tuple(str(name).split())
         if extras is not None:
             own = _of(extras, members)
-            parts = [texels]
+            parts: list[npt.NDArray[np.floating]] = [texels]
             if any(define.startswith("SHADOW") for define in defines):
                 parts.append(_with_dark(own.shadow))
             if any(define.startswith("PROFILE") for define in defines):

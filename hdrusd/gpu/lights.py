@@ -17,12 +17,14 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from hdrusd.gpu.batches import Draws, Lists, batches
 from hdrusd.gpu.light_tables import Extras, LightClass, light_classes
 from hdrusd.gpu.program import Programs
 from hdrusd.gpu.surfaces import set_used
 from hdrusd.scene import Camera, Material, RenderScene
 
 Ints = npt.NDArray[np.int32]
+Bind = Callable[[moderngl.Program], None]
 
 #: Side of a tile, pixels.
 TILE = 32
@@ -36,24 +38,17 @@ TABLE_UNIT, ORDER_UNIT = 5, 6
 #: Bits of a tile's highlights, and the #defines for them.
 _GLOSS: dict[int, tuple[str, ...]] = {0: (), 1: ("BLINN",), 2: ("GGX",), 3: ("BLINN", "GGX")}
 
+_PLAIN, _CONES = ("PLAIN",), ("CONES",)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TileBounds:
-    """What the tiles show, (rows, columns, 4), bottom row first; tile_bounds.frag."""
+    """What the tiles show, each (rows, columns), bottom row first; tile_bounds.frag."""
 
     near: npt.NDArray[np.float32]  # m along the view axis; above ``far`` where nothing is seen
     far: npt.NDArray[np.float32]
     lobe: npt.NDArray[np.float32]  # narrowest highlight, rad
     gloss: npt.NDArray[np.int32]  # 1 Blinn-Phong, 2 GGX, 3 both
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Batches:
-    """Rectangles and their lights for one gloss: one instanced draw for each batch size."""
-
-    areas: Ints  # (k, 4) left, bottom, right, top, pixels
-    lists: Ints  # (k, 2) where in ``order`` they begin, lights in them
-    order: Ints  # numbers of lights in the class's table
 
 
 class LightPass:
@@ -70,7 +65,7 @@ class LightPass:
         self._bounds = ctx.texture(self._grid, 4, dtype="f4")
         self._bounds_frame = ctx.framebuffer([self._bounds])
         self._areas = ctx.buffer(reserve=1 << 16, dynamic=True)
-        self._lists = ctx.buffer(reserve=1 << 15, dynamic=True)
+        self._lists = ctx.buffer(reserve=1 << 16, dynamic=True)
         self._vaos: dict[moderngl.Program, moderngl.VertexArray] = {}
 
     def add(
@@ -79,7 +74,7 @@ class LightPass:
         layers: Mapping[str, moderngl.Texture],
         frame: moderngl.Framebuffer,
         extras: Extras | None = None,
-        bind: Callable[[moderngl.Program], None] | None = None,
+        bind: Bind | None = None,
     ) -> None:
         """All lights of a scene into ``frame`` (blended, depth kept).
 
@@ -96,14 +91,22 @@ class LightPass:
         ctx.depth_func = ">"
         ctx.blend_func = moderngl.ONE, moderngl.ONE
         frame.depth_mask = False
-        units = {name: unit for unit, name in enumerate(layers)}
-        for name, unit in units.items():
-            layers[name].use(unit)
-        shared: dict[str, Any] = {"lambert_scale": self.scale, "size": self.size}
-        shared |= units | window_uniforms(scene.camera)
-        coated = "g_extra" in layers
-        for kind in classes:
-            self._add_class(kind, bounds, shared, coated, bind)
+        uniforms = {name: unit for unit, name in enumerate(layers)} | {
+            "lights": TABLE_UNIT,
+            "order": ORDER_UNIT,
+            "lambert_scale": self.scale,
+            "size": self.size,
+        }
+        uniforms |= window_uniforms(scene.camera)
+        for unit, layer in enumerate(layers.values()):
+            layer.use(unit)
+        table = _Table(ctx, classes)
+        for gloss, names in _GLOSS.items():
+            areas = runs(np.where(bounds.far > 0.0, bounds.gloss, -1) == gloss, self.size)
+            if len(areas):
+                coated = ("COATED",) if "g_extra" in layers and 2 & gloss else ()
+                self._add_classes(table, areas, (*names, *coated), uniforms, bind)
+        table.release()
         frame.depth_mask = True
         ctx.enable_only(moderngl.NOTHING)
 
@@ -119,55 +122,99 @@ class LightPass:
         vao.render(moderngl.TRIANGLES, vertices=3)
         columns, rows = self._grid
         found = np.frombuffer(self._bounds.read(), np.float32).reshape(rows, columns, 4)
-        return TileBounds(
-            found[..., 0], found[..., 1], found[..., 2], found[..., 3].astype(np.int32)
-        )
+        near, far, lobe, gloss = np.moveaxis(found, -1, 0)
+        return TileBounds(near, far, lobe, gloss.astype(np.int32))
 
-    def _add_class(
+    def _add_classes(
         self,
-        kind: LightClass,
-        bounds: TileBounds,
-        shared: dict[str, Any],
-        coated: bool,
-        bind: Callable[[moderngl.Program], None] | None,
+        table: _Table,
+        areas: Ints,
+        names: Sequence[str],
+        uniforms: Mapping[str, Any],
+        bind: Bind | None,
     ) -> None:
-        table = _texture(self.ctx, kind.texels, "f4")
-        table.use(TABLE_UNIT)
-        for gloss, defines in _GLOSS.items():
-            batches = exact_batches(kind, bounds, gloss, self.size)
-            if not len(batches.areas):
-                continue
-            order = _texture(self.ctx, batches.order, "i4")
-            order.use(ORDER_UNIT)
-            sizes = np.searchsorted(kind.batches, batches.lists[:, 1])
-            names = (*kind.defines, *defines, *(("COATED",) if coated and 2 & gloss else ()))
-            for number in np.unique(sizes):
-                batch = kind.batches[number]
-                program = self._program(kind.rows, batch, names)
-                own = {"lights": TABLE_UNIT, "order": ORDER_UNIT, "count": len(kind.members)}
-                for name, value in (shared | own).items():
+        """All lights on ``areas``, whose surfaces have one kind of highlight."""
+        for kind, coned in table.pairs():
+            lists = Lists.same(table.starts(kind), len(areas))
+            coned_lists = Lists.same(table.starts(coned), len(areas))
+            order = np.concatenate([lists.order, coned_lists.order])
+            texture = _texture(self.ctx, order, "i4")
+            texture.use(ORDER_UNIT)
+            dark = (table.dark(kind), table.dark(coned))
+            rows = kind.rows if kind is not None else 2
+            for draws in batches(
+                lists,
+                kind.batches if kind is not None else (1,),
+                rows,
+                coned_lists.after(len(lists.order)),
+                coned.batches if coned is not None else (1,),
+            ):
+                program = self._program(kind, rows, draws.sizes, names)
+                for name, value in {**uniforms, "dark": dark}.items():
                     set_used(program, name, value)
                 if bind is not None:
                     bind(program)
-                chosen = sizes == number
-                self._draw(program, batches.areas[chosen], batches.lists[chosen])
-            order.release()
-        table.release()
+                self._draw(program, areas, draws)
+            texture.release()
 
-    def _program(self, rows: int, batch: int, names: Sequence[str]) -> moderngl.Program:
-        defines: dict[str, str | int | float] = {"ROWS": rows, "BATCH": batch, "ALL": f"ALL{batch}"}
-        defines |= dict.fromkeys(names, 1)
+    def _program(
+        self, kind: LightClass | None, rows: int, sizes: tuple[int, int], names: Sequence[str]
+    ) -> moderngl.Program:
+        first, coned = sizes
+        defines: dict[str, str | int | float] = {
+            "ROWS": rows,
+            "FIRST": first,
+            "CONED": coned,
+            "ALL_FIRST": f"ALL{first}",
+            "ALL_CONED": f"ALL{coned}",
+        }
+        own = kind.defines if kind is not None and first else ()
+        defines |= dict.fromkeys((*own, *names), 1)
         return self.programs.get("gpu/shaders/light.vert", "gpu/shaders/light.frag", defines)
 
-    def _draw(self, program: moderngl.Program, areas: Ints, lists: Ints) -> None:
-        for buffer, data in ((self._areas, areas), (self._lists, lists)):
+    def _draw(self, program: moderngl.Program, areas: Ints, draws: Draws) -> None:
+        for buffer, data in ((self._areas, areas[draws.rectangles]), (self._lists, draws.lists)):
             if buffer.size < data.nbytes:
                 buffer.orphan(2 * data.nbytes)
             buffer.write(np.ascontiguousarray(data, np.int32))
         if program not in self._vaos:
-            content = [(self._areas, "4i /i", "in_area"), (self._lists, "2i /i", "in_list")]
+            content = [(self._areas, "4i /i", "in_area"), (self._lists, "4i /i", "in_list")]
             self._vaos[program] = self.ctx.vertex_array(program, content)
-        self._vaos[program].render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(areas))
+        instances = len(draws.rectangles)
+        self._vaos[program].render(moderngl.TRIANGLE_STRIP, vertices=4, instances=instances)
+
+
+class _Table:
+    """The texels of all classes one after the other, in a texture."""
+
+    def __init__(self, ctx: moderngl.Context, classes: Sequence[LightClass]) -> None:
+        self.classes = classes
+        sizes = [len(kind.texels) * kind.rows for kind in classes]
+        self._first = dict(zip(map(id, classes), np.cumsum([0, *sizes[:-1]]).tolist(), strict=True))
+        texels = np.concatenate([kind.texels.reshape(-1, 4) for kind in classes])
+        self._texture = _texture(ctx, texels, "f4")
+        self._texture.use(TABLE_UNIT)
+
+    def release(self) -> None:
+        self._texture.release()
+
+    def starts(self, kind: LightClass | None) -> Ints:
+        """(n,) where each light of a class begins."""
+        if kind is None:
+            return np.zeros(0, np.int32)
+        count = np.arange(len(kind.members), dtype=np.int32)
+        return np.asarray(self._first[id(kind)] + count * kind.rows, np.int32)
+
+    def dark(self, kind: LightClass | None) -> int:
+        """Where the light begins that is not there."""
+        return 0 if kind is None else self._first[id(kind)] + len(kind.members) * kind.rows
+
+    def pairs(self) -> list[tuple[LightClass | None, LightClass | None]]:
+        """What is drawn together: lamps without and with a cone, each other class alone."""
+        named = {kind.defines: kind for kind in self.classes}
+        simple = named.pop(_PLAIN, None), named.pop(_CONES, None)
+        rest = [(kind, None) for kind in named.values()]
+        return [simple, *rest] if any(simple) else [*rest]
 
 
 def shines(material: Material) -> bool:
@@ -175,21 +222,6 @@ def shines(material: Material) -> bool:
     values = any(material.specular) or material.metallic > 0.0 or material.clearcoat > 0.0
     maps = (material.specular_map, material.metallic_map, material.clearcoat_map)
     return values or any(use is not None for use in maps)
-
-
-def exact_batches(
-    kind: LightClass, bounds: TileBounds, gloss: int, size: tuple[int, int]
-) -> Batches:
-    """Every light of a class on every tile of that gloss."""
-    areas = runs(np.where(bounds.far > 0.0, bounds.gloss, -1) == gloss, size)
-    count = len(kind.members)
-    first = np.arange(0, count, kind.batches[-1], dtype=np.int32)
-    lists = np.stack([first, np.minimum(count - first, kind.batches[-1])], axis=1)
-    return Batches(
-        areas=np.repeat(areas, len(lists), axis=0),
-        lists=np.tile(lists, (len(areas), 1)).astype(np.int32),
-        order=np.arange(count, dtype=np.int32),
-    )
 
 
 def runs(chosen: npt.NDArray[np.bool_], size: tuple[int, int]) -> Ints:
@@ -204,8 +236,8 @@ def runs(chosen: npt.NDArray[np.bool_], size: tuple[int, int]) -> Ints:
 def _texture(
     ctx: moderngl.Context, values: npt.NDArray[np.generic], dtype: str
 ) -> moderngl.Texture:
-    """Values in rows of one width: (n, rows, 4) float32 texels, or (n,) int32 numbers."""
-    channels = 4 if values.ndim == 3 else 1
+    """Values in rows of one width: (n, 4) float32 texels, or (n,) int32 numbers."""
+    channels = 4 if values.ndim == 2 else 1
     flat = values.reshape(-1, channels)
     width = min(max(len(flat), 1), _WIDTH)
     height = max(-(-len(flat) // width), 1)

@@ -6,7 +6,7 @@
 #include "gpu/shaders/gbuffer.glsl"
 
 in vec2 window;
-flat in vec4 data[BATCH * ROWS];
+flat in vec4 data[FIRST * ROWS + CONED * 3];
 layout(location = 0) out vec4 hdr;
 
 uniform float lambert_scale;  // 1/pi, or 1 for petit2010
@@ -29,35 +29,38 @@ struct Arrival {
     float nl;
 };
 
-#if defined(SPECIAL)
-// SPECIAL_INCLUDE
-#define ARRIVAL(i) Arrival a = special_arrival(s, (i) * ROWS);
-#else
-// Rows of a light: position, w | intensity rgb, 1/radius^2 | axis, exponent | inner, 1/width, 0, 0.
-// With CONES (and no exponent): position, 1/radius^2 | intensity rgb, inner | axis, 1/width.
-#if defined(FOCUS)
-#define POSITION(i) data[(i) * ROWS].xyz, data[(i) * ROWS].w
-#define INVERSE_RADIUS2(i) data[(i) * ROWS + 1].w
-#define SHAPE(i) * cone_factor(-dot(a.l, data[(i) * ROWS + 2].xyz), data[(i) * ROWS + 3].x, \
-                               data[(i) * ROWS + 3].y) \
-                 * focus_factor(-dot(a.l, data[(i) * ROWS + 2].xyz), data[(i) * ROWS + 2].w)
-#elif defined(CONES)
-#define POSITION(i) data[(i) * ROWS].xyz, 1.0
-#define INVERSE_RADIUS2(i) data[(i) * ROWS].w
-#define SHAPE(i) * cone_factor(-dot(a.l, data[(i) * ROWS + 2].xyz), data[(i) * ROWS + 1].w, \
-                               data[(i) * ROWS + 2].w)
-#else
-#define POSITION(i) data[(i) * ROWS].xyz, data[(i) * ROWS].w
-#define INVERSE_RADIUS2(i) data[(i) * ROWS + 1].w
-#define SHAPE(i)
-#endif
-#define ARRIVAL(i) \
+// A light of three texels: position, 1/radius^2 | intensity, inner | axis, 1/width.
+#define CONE_ARRIVAL(i) \
     Arrival a; \
-    a.l = light_vector(POSITION(i), s.p); \
+    POINT_ARRIVAL(vec4(data[FIRST * ROWS + (i) * 3].xyz, 1.0), data[FIRST * ROWS + (i) * 3 + 1].xyz, \
+                  data[FIRST * ROWS + (i) * 3].w) \
+    a.lux *= cone_factor(-dot(a.l, data[FIRST * ROWS + (i) * 3 + 2].xyz), \
+                         data[FIRST * ROWS + (i) * 3 + 1].w, data[FIRST * ROWS + (i) * 3 + 2].w); \
+    a.gloss_lux = a.lux;
+#define POINT_ARRIVAL(place, candela, inverse_radius2) \
+    a.l = light_vector((place).xyz, (place).w, s.p); \
     float inverse_d = inversesqrt(max(dot(a.l, a.l), 1e-20)); \
     a.l *= inverse_d; \
     a.nl = dot(s.n, a.l); \
-    a.lux = data[(i) * ROWS + 1].xyz * (illuminance(a.nl, inverse_d * inverse_d, INVERSE_RADIUS2(i)) SHAPE(i)); \
+    a.lux = (candela) * illuminance(a.nl, inverse_d * inverse_d, inverse_radius2);
+
+#if defined(SPECIAL)
+// SPECIAL_INCLUDE
+#define ARRIVAL(i) Arrival a = special_arrival(s, (i) * ROWS);
+#elif defined(FOCUS)
+// Four texels: position, w | intensity, 1/radius^2 | axis, exponent | inner, 1/width, 0, 0.
+#define ARRIVAL(i) \
+    Arrival a; \
+    POINT_ARRIVAL(data[(i) * 4], data[(i) * 4 + 1].xyz, data[(i) * 4 + 1].w) \
+    float cosine = -dot(a.l, data[(i) * 4 + 2].xyz); \
+    a.lux *= cone_factor(cosine, data[(i) * 4 + 3].x, data[(i) * 4 + 3].y) \
+             * focus_factor(cosine, data[(i) * 4 + 2].w); \
+    a.gloss_lux = a.lux;
+#else
+// Two texels: position, w | intensity, 1/radius^2.
+#define ARRIVAL(i) \
+    Arrival a; \
+    POINT_ARRIVAL(data[(i) * 2], data[(i) * 2 + 1].xyz, data[(i) * 2 + 1].w) \
     a.gloss_lux = a.lux;
 #endif
 
@@ -87,12 +90,15 @@ vec3 highlight(Surface s, Arrival a)
     return a.gloss_lux * ks * blinn_phong(nh, s.gloss, lambert_scale);
 #endif
 }
-#define ADD(i) { ARRIVAL(i) sum += a.lux; gloss += highlight(s, a); }
+#define REFLECT sum += a.lux; gloss += highlight(s, a);
 #else
-#define ADD(i) { ARRIVAL(i) sum += a.lux; }
+#define REFLECT sum += a.lux;
 #endif
+#define ADD(i) { ARRIVAL(i) REFLECT }
+#define ADD_CONE(i) { CONE_ARRIVAL(i) REFLECT }
 
-// ALL, one of these, applies X to each light of the batch.
+// ALL_FIRST and ALL_CONED, two of these, apply X to each light of their kind in the batch.
+#define ALL0(X)
 #define ALL1(X) X(0)
 #define ALL3(X) ALL1(X) X(1) X(2)
 #define ALL4(X) ALL3(X) X(3)
@@ -126,6 +132,7 @@ void main()
     coat = extra.xy;
 #endif
 #endif
-    ALL(ADD)
+    ALL_FIRST(ADD)
+    ALL_CONED(ADD_CONE)
     hdr = vec4(lambert(diffuse.rgb, sum, lambert_scale) + gloss, 0.0);
 }

@@ -1,19 +1,27 @@
 // One instance is a rectangle of the screen and a batch of lights: its vertices fetch them once.
 // A buffer read in every pixel is what costs on a software device, not the arithmetic.
+// A batch is FIRST lights of ROWS texels and CONED lights (see light.frag) of CONE_ROWS.
 in ivec4 in_area;          // left, bottom, right, top, pixels
-in ivec2 in_list;          // where the batch begins in ``order``, and lights in it
-uniform sampler2D lights;  // ROWS texels a light, light after light; the last light is dark
-uniform isampler2D order;  // numbers of lights, batch after batch
-uniform int count;         // lights in all
+in ivec4 in_list;          // where the two kinds begin in ``order``, and how many: first, n, first, n
+uniform sampler2D lights;  // texels, light after light
+uniform isampler2D order;  // where lights begin in it, batch after batch
+uniform ivec2 dark;        // where a light begins that is not there, of either kind
 uniform vec2 size;         // of the picture, pixels
 
-flat out vec4 data[BATCH * ROWS];
+#define CONE_ROWS 3
+flat out vec4 data[FIRST * ROWS + CONED * CONE_ROWS];
 out vec2 window;           // 0 to 1 over the picture
 
-ivec2 place(int index, sampler2D image)
+int light_at(int index)
 {
-    int width = textureSize(image, 0).x;
-    return ivec2(index % width, index / width);
+    int width = textureSize(order, 0).x;
+    return texelFetch(order, ivec2(index % width, index / width), 0).r;
+}
+
+vec4 texel(int index)
+{
+    int width = textureSize(lights, 0).x;
+    return texelFetch(lights, ivec2(index % width, index / width), 0);
 }
 
 void main()
@@ -21,11 +29,18 @@ void main()
     window = vec2((gl_VertexID & 1) == 0 ? in_area.x : in_area.z,
                   (gl_VertexID & 2) == 0 ? in_area.y : in_area.w) / size;
     gl_Position = vec4(window * 2.0 - 1.0, 1.0, 1.0);  // farthest: only pixels with a surface pass
-    int width = textureSize(order, 0).x;
-    for (int i = 0; i < BATCH; ++i) {
-        int at = in_list.x + i;
-        int light = i < in_list.y ? texelFetch(order, ivec2(at % width, at / width), 0).r : count;
+#if FIRST > 0
+    for (int i = 0; i < FIRST; ++i) {
+        int light = i < in_list.y ? light_at(in_list.x + i) : dark.x;
         for (int k = 0; k < ROWS; ++k)
-            data[i * ROWS + k] = texelFetch(lights, place(light * ROWS + k, lights), 0);
+            data[i * ROWS + k] = texel(light + k);
     }
+#endif
+#if CONED > 0
+    for (int i = 0; i < CONED; ++i) {
+        int light = i < in_list.w ? light_at(in_list.z + i) : dark.y;
+        for (int k = 0; k < CONE_ROWS; ++k)
+            data[FIRST * ROWS + i * CONE_ROWS + k] = texel(light + k);
+    }
+#endif
 }
