@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Literal
 
 import moderngl
@@ -20,6 +21,7 @@ import numpy.typing as npt
 
 from hdrusd.gpu.lights import LightPass
 from hdrusd.gpu.program import Programs
+from hdrusd.gpu.supersampling import Accumulator, offsets, shifted
 from hdrusd.gpu.surfaces import SurfacePass
 from hdrusd.gpu.textures import TextureCache
 from hdrusd.scene import ImageData, RenderScene, TextureRef
@@ -49,6 +51,7 @@ class HdrRenderer:
         *,
         reflection: Reflection = "lambert",
         gamma: float = TEXTURE_GAMMA,
+        samples: int = 1,
     ) -> None:
         self.ctx = ctx
         self.programs = programs
@@ -60,29 +63,45 @@ class HdrRenderer:
             layer.filter = (moderngl.NEAREST, moderngl.NEAREST)
         depth = ctx.depth_texture(size)
         self._gbuffer = ctx.framebuffer(self._layers, depth)
-        self._frame = ctx.framebuffer([self.hdr], depth)
+        self._frame = ctx.framebuffer([self._layers[-1]], depth)
         self.lights = LightPass(ctx, programs, size, self.scale)
+        self._samples = tuple(offsets(samples))
+        self._sum = Accumulator(ctx, programs, size) if samples > 1 else None
 
     @property
     def hdr(self) -> moderngl.Texture:
-        """RGBA32F, cd/m2 in RGB, 1 in A where there is a surface; bottom row first."""
-        return self._layers[-1]
+        """RGBA32F, cd/m2 in RGB; A is the share of a pixel with a surface; bottom row first."""
+        return self._layers[-1] if self._sum is None else self._sum.texture
 
     def render(self, scene: RenderScene) -> moderngl.Texture:
         """Draw one moment; returns ``hdr``."""
+        if self._sum is None:
+            self._draw(scene)
+            return self.hdr
+        self._sum.clear()
+        for offset in self._samples:
+            self._draw(replace(scene, camera=shifted(scene.camera, offset, self.size)))
+            self._sum.add(self._layers[-1], 1.0 / len(self._samples))
+        return self.hdr
+
+    def _draw(self, scene: RenderScene) -> None:
         self.draw_surfaces(scene)
         self.add_lights(scene)
-        return self.hdr
 
     def read(self) -> npt.NDArray[np.float32]:
         """The frame as (h, w, 3) float32 in cd/m2, top row first."""
-        return np.ascontiguousarray(self.layer("hdr")[..., :3])
+        return np.ascontiguousarray(self._read(self.hdr)[..., :3])
 
     def layer(self, name: str) -> npt.NDArray[np.float32]:
-        """A layer of the G-buffer (``LAYERS``; gbuffer.frag) as (h, w, 4), top row first."""
+        """A layer of the G-buffer (``LAYERS``; gbuffer.frag) as (h, w, 4), top row first.
+
+        Of a supersampled frame: of its last sample.
+        """
+        return self._read(self._layers[LAYERS.index(name)])
+
+    def _read(self, texture: moderngl.Texture) -> npt.NDArray[np.float32]:
         w, h = self.size
-        data = self._layers[LAYERS.index(name)].read()
-        return np.frombuffer(data, np.float32).reshape(h, w, 4)[::-1]
+        return np.frombuffer(texture.read(), np.float32).reshape(h, w, 4)[::-1]
 
     def draw_surfaces(self, scene: RenderScene) -> None:
         """Step one: G-buffer, and emission plus ambient in the frame."""
