@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hdrusd.gpu.profiles import PROFILE
+from hdrusd.gpu.shadows import shadow_rows
 from hdrusd.photometry.light import inverse_edge, inverse_square
 from hdrusd.scene import CYLINDER, DISK, NO_CONE, POINT, RECT, SPHERE, Camera
 
@@ -35,15 +37,21 @@ SMALL_SPHERE = 0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Extras:
-    """What other parts of the renderer know of each light; (n, k, 4) float32 texels.
+    """What other parts of the renderer know of each light: #defines in words, and texels."""
 
-    ``shadow_kind``: (n,) names of #defines, "" for a light without shadows.
-    """
+    shadow_kind: npt.NDArray[np.str_]  # (n,), "" without shadows
+    shadow: Floats  # (n, k, 4); gpu/shadows.py
+    profile_kind: npt.NDArray[np.str_]  # (n,), "" without a profile
+    profile: Floats  # (n, k, 4); gpu/profiles.py
 
-    shadow_kind: npt.NDArray[np.str_]
-    shadow: Floats
-    profile: Floats
-    profile_kind: npt.NDArray[np.str_]
+    def of(self, which: npt.NDArray[np.intp]) -> Extras:
+        """Those of some lights."""
+        return Extras(
+            self.shadow_kind[which],
+            self.shadow[which],
+            self.profile_kind[which],
+            self.profile[which],
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +81,7 @@ def light_classes(lights: Lights, camera: Camera, extras: Extras | None = None) 
     """
     lit = np.flatnonzero(np.any(lights["intensity"] != 0.0, axis=1))
     chosen = lights[lit]
-    kinds = _kinds(chosen, None if extras is None else _of(extras, lit))
+    kinds = _kinds(chosen, None if extras is None else extras.of(lit))
     names, which = np.unique(kinds, return_inverse=True)
     classes = []
     for number, name in enumerate(names):
@@ -81,24 +89,15 @@ def light_classes(lights: Lights, camera: Camera, extras: Extras | None = None) 
         texels = _texels(lights[members], camera, str(name))
         defines = tuple(str(name).split())
         if extras is not None:
-            own = _of(extras, members)
+            own = extras.of(members)
             parts: list[npt.NDArray[np.floating]] = [texels]
-            if any(define.startswith("SHADOW") for define in defines):
-                parts.append(_with_dark(own.shadow))
-            if any(define.startswith("PROFILE") for define in defines):
+            if "SHADOWED" in defines:
+                parts.append(_with_dark(own.shadow[:, : shadow_rows(str(name))]))
+            if PROFILE in defines:
                 parts.append(_with_dark(own.profile))
             texels = np.concatenate(parts, axis=1)
         classes.append(LightClass(defines, members, np.ascontiguousarray(texels, np.float32)))
     return classes
-
-
-def _of(extras: Extras, which: npt.NDArray[np.intp]) -> Extras:
-    return Extras(
-        extras.shadow_kind[which],
-        extras.shadow[which],
-        extras.profile[which],
-        extras.profile_kind[which],
-    )
 
 
 def _with_dark(texels: Floats) -> Floats:
@@ -117,15 +116,19 @@ def _kinds(lights: Lights, extras: Extras | None) -> npt.NDArray[np.str_]:
     if extras is not None:
         plain &= (extras.shadow_kind == "") & (extras.profile_kind == "")
     simple = np.where(focus, "FOCUS", np.where(cone, "CONES", "PLAIN"))
-    words = np.full(len(lights), "SPECIAL", dtype="U80")
+    words = np.full(len(lights), "SPECIAL", dtype="U200")
     words = np.where(focus | cone, np.char.add(words, " BEAM"), words)
     for number, name in _SHAPES.items():
         words = np.where(shape == number, np.char.add(words, f" {name}"), words)
     words = np.where(~local & (lights["angle"] > 0.0), np.char.add(words, " DISTANT"), words)
     words = np.where(lights["link"] > 0, np.char.add(words, " LINKED"), words)
     if extras is not None:
-        for kind in (extras.profile_kind, extras.shadow_kind):
-            words = np.where(kind != "", np.char.add(np.char.add(words, " "), kind), words)
+        shadow = np.char.add("SHADOWED ", extras.shadow_kind)
+        for kind, text in (
+            (extras.profile_kind, extras.profile_kind),
+            (extras.shadow_kind, shadow),
+        ):
+            words = np.where(kind != "", np.char.add(np.char.add(words, " "), text), words)
     return np.asarray(np.where(plain, simple, words))
 
 

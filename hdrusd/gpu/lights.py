@@ -24,7 +24,7 @@ from hdrusd.gpu.surfaces import set_used
 from hdrusd.scene import Camera, Material, RenderScene
 
 Ints = npt.NDArray[np.int32]
-Bind = Callable[[moderngl.Program], None]
+Bind = Callable[[moderngl.Program, Sequence[str]], None]
 
 #: Side of a tile, pixels.
 TILE = 32
@@ -32,8 +32,11 @@ TILE = 32
 #: Texels a row of the tables that vertices read; every device has as many.
 _WIDTH = 2048
 
-#: Texture units, after those of the G-buffer; 7 and up are for what a light's extras need.
-TABLE_UNIT, ORDER_UNIT = 5, 6
+#: Texture units, after those of the G-buffer.
+TABLE_UNIT, ORDER_UNIT, SHADOW_UNIT, PROFILE_UNIT = 5, 6, 7, 8
+
+#: Points of an area light whose shadows are looked at.
+SAMPLES = 16
 
 #: Bits of a tile's highlights, and the #defines for them.
 _GLOSS: dict[int, tuple[str, ...]] = {0: (), 1: ("BLINN",), 2: ("GGX",), 3: ("BLINN", "GGX")}
@@ -79,7 +82,7 @@ class LightPass:
         """All lights of a scene into ``frame`` (blended, depth kept).
 
         ``layers``: the G-buffer by the names of its samplers. ``bind``: sets what the
-        extras need in a program.
+        extras need in a program with these #defines.
         """
         classes = light_classes(scene.lights, scene.camera, extras)
         if not classes:
@@ -152,8 +155,8 @@ class LightPass:
                 program = self._program(kind, rows, draws.sizes, names)
                 for name, value in {**uniforms, "dark": dark}.items():
                     set_used(program, name, value)
-                if bind is not None:
-                    bind(program)
+                if bind is not None and kind is not None:
+                    bind(program, kind.defines)
                 self._draw(program, areas, draws)
             texture.release()
 
@@ -169,6 +172,8 @@ class LightPass:
             "ALL_CONED": f"ALL{coned}",
         }
         own = kind.defines if kind is not None and first else ()
+        if "SHADOWED" in own:
+            defines["SAMPLES"] = SAMPLES
         defines |= dict.fromkeys((*own, *names), 1)
         return self.programs.get("gpu/shaders/light.vert", "gpu/shaders/light.frag", defines)
 

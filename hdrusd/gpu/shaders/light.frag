@@ -2,7 +2,7 @@
 // added up over one batch of lights. Result in cd/m2.
 #include "photometry/light.glsl"
 #include "photometry/reflectance.glsl"
-// MICROFACET
+#include "photometry/microfacet.glsl"
 #include "gpu/shaders/gbuffer.glsl"
 
 in vec2 window;
@@ -45,7 +45,7 @@ struct Arrival {
     a.lux = (candela) * illuminance(a.nl, inverse_d * inverse_d, inverse_radius2);
 
 #if defined(SPECIAL)
-// SPECIAL_INCLUDE
+#include "gpu/shaders/special_light.glsl"
 #define ARRIVAL(i) Arrival a = special_arrival(s, (i) * ROWS);
 #elif defined(FOCUS)
 // Four texels: position, w | intensity, 1/radius^2 | axis, exponent | inner, 1/width, 0, 0.
@@ -64,43 +64,60 @@ struct Arrival {
     a.gloss_lux = a.lux;
 #endif
 
-// The highlight: BLINN, GGX or both in a tile; sums of luminance.
-#if defined(BLINN) || defined(GGX)
+// What reflection a tile has: none but diffuse, BLINN, GGX, or both.
+vec3 sum = vec3(0.0);    // lux that diffuse reflection gets
+vec3 gloss = vec3(0.0);  // cd/m2 of highlights
+#if defined(GGX)
+vec3 ks, f90;
+float alpha2, gain;
+#ifdef COATED
+float coat, coat_alpha2, coat_gain;
+#endif
+#elif defined(BLINN)
 vec3 ks;
+#endif
 
-#ifdef COATED
-vec2 coat;  // weight, alpha
-#endif
-vec3 highlight(Surface s, Arrival a)
+void reflect_light(Surface s, Arrival a)
 {
-    float vl = dot(s.v, a.l);
-    float nh = half_cosine(a.nl, s.nv, vl);
-    vec3 sum = vec3(0.0);
-#ifdef GGX
-    vec3 ggx = ggx_lobe(ks, f90, -s.gloss, a.nl, s.nv, nh, vl, lambert_scale);
-#ifdef COATED
-    ggx = coated(ggx, coat, a.nl, s.nv, nh, vl, lambert_scale);
-#endif
-#endif
-#if defined(BLINN) && defined(GGX)
-    return a.gloss_lux * (s.gloss < 0.0 ? ggx : ks * blinn_phong(nh, s.gloss, lambert_scale));
-#elif defined(GGX)
-    return a.gloss_lux * ggx;
+#if defined(GGX)
+    vec2 half_way = half_angles(s.n, a.l, s.v, a.nl, s.nv);
+    float weight = schlick_weight(half_way.y);
+    vec3 f = fresnel(ks, f90, weight);
+    float lobe = ggx_lobe(gain, alpha2, a.nl, half_way.x);
+#ifdef BLINN
+    bool blinn = s.gloss >= 0.0;
+    float nh = half_cosine(a.nl, s.nv, dot(s.v, a.l));
+    lobe = blinn ? blinn_phong(nh, s.gloss, lambert_scale) : lobe;
+    vec3 below = blinn ? vec3(1.0) : 1.0 - f;
+    f = blinn ? ks : f;
 #else
-    return a.gloss_lux * ks * blinn_phong(nh, s.gloss, lambert_scale);
+    vec3 below = 1.0 - f;
+#endif
+    vec3 shine = f * lobe;
+#ifdef COATED
+    float c = coat_reflectance(coat, weight);
+    below *= 1.0 - c;
+    shine = layered(shine, vec3(c), ggx_lobe(coat_gain, coat_alpha2, a.nl, half_way.x));
+#endif
+    sum += a.lux * below;
+    gloss += a.gloss_lux * shine;
+#else
+    sum += a.lux;
+#ifdef BLINN
+    gloss += a.gloss_lux * blinn_phong(half_cosine(a.nl, s.nv, dot(s.v, a.l)), s.gloss, lambert_scale);
+#endif
 #endif
 }
-#define REFLECT sum += a.lux; gloss += highlight(s, a);
-#else
-#define REFLECT sum += a.lux;
-#endif
+
+#define REFLECT reflect_light(s, a);
 #define ADD(i) { ARRIVAL(i) REFLECT }
 #define ADD_CONE(i) { CONE_ARRIVAL(i) REFLECT }
 
 // ALL_FIRST and ALL_CONED, two of these, apply X to each light of their kind in the batch.
 #define ALL0(X)
 #define ALL1(X) X(0)
-#define ALL3(X) ALL1(X) X(1) X(2)
+#define ALL2(X) ALL1(X) X(1)
+#define ALL3(X) ALL2(X) X(2)
 #define ALL4(X) ALL3(X) X(3)
 #define ALL5(X) ALL4(X) X(4)
 #define ALL7(X) ALL5(X) X(5) X(6)
@@ -118,7 +135,6 @@ void main()
     s.nv = dot(s.n, s.v);
     vec4 diffuse = textureLod(g_diffuse, window, 0.0);
     s.gloss = diffuse.w;
-    vec3 sum = vec3(0.0), gloss = vec3(0.0);
 #if defined(LINKED) || defined(COATED)
     vec4 extra = textureLod(g_extra, window, 0.0);
     s.links = extra.z;
@@ -126,13 +142,21 @@ void main()
 #if defined(BLINN) || defined(GGX)
     vec4 specular = textureLod(g_specular, window, 0.0);
     ks = specular.rgb;
-
-
+#endif
+#ifdef GGX
+    f90 = grazing_reflectance(ks, specular.w);
+    alpha2 = s.gloss * s.gloss;
+    gain = ggx_gain(s.nv, alpha2, lambert_scale);
 #ifdef COATED
-    coat = extra.xy;
+    coat = extra.x;
+    coat_alpha2 = extra.y * extra.y;
+    coat_gain = ggx_gain(s.nv, coat_alpha2, lambert_scale);
 #endif
 #endif
     ALL_FIRST(ADD)
     ALL_CONED(ADD_CONE)
+#if defined(BLINN) && !defined(GGX)
+    gloss *= ks;
+#endif
     hdr = vec4(lambert(diffuse.rgb, sum, lambert_scale) + gloss, 0.0);
 }
