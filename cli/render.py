@@ -23,6 +23,10 @@ from .options import (
     write_report,
 )
 
+#: usdrecord's names and numbers of --complexity, and how often they refine.
+COMPLEXITIES = {name: level for level, name in enumerate(("low", "medium", "high", "veryhigh"))}
+COMPLEXITIES |= {"1.0": 0, "1.1": 1, "1.2": 2, "1.3": 3}
+
 
 @click.command("render")
 @click.argument("stage", type=FILE)
@@ -61,6 +65,14 @@ from .options import (
     type=click.IntRange(1, 16384),
     help="Pixels. [default: by the aspect ratio]",
 )
+@click.option(
+    "--complexity",
+    "-c",
+    type=click.Choice(list(COMPLEXITIES)),
+    default="low",
+    show_default=True,
+    help="Refinement of subdivision meshes and curves: 0 to 3 times.",
+)
 @click.option("--png", metavar="PATTERN", help="Write tone-mapped pictures too.")
 @click.option(
     "--reflection",
@@ -84,6 +96,13 @@ from .options import (
     help="Purposes drawn beside default: render, proxy, guide.",
 )
 @click.option("--mask", metavar="PRIMPATH[,...]", help="Open only these prims.")
+@click.option(
+    "--variant",
+    "variants",
+    metavar="PRIM:SET=NAME",
+    multiple=True,
+    help="Select a variant; may be given more than once.",
+)
 @click.option("--session-layer", "--sessionLayer", type=FILE, help="Layer over the stage.")
 @click.option(
     "--render-settings-prim-path",
@@ -103,6 +122,43 @@ from .options import (
     "--enableDomeLightVisibility",
     is_flag=True,
     help="Show the sky behind the scene.",
+)
+@click.option(
+    "--samples",
+    type=click.IntRange(1, 1024),
+    default=1,
+    show_default=True,
+    help="Samples a pixel; it shows their mean (a box filter of one pixel).",
+)
+@click.option(
+    "--shadows",
+    type=click.Choice(["maps", "none"]),
+    default="maps",
+    show_default=True,
+    help="none: every light reaches every surface, as in the paper.",
+)
+@click.option(
+    "--lights",
+    type=click.Choice(["auto", "exact", "merged"]),
+    default="auto",
+    show_default=True,
+    help="exact: every light in every pixel. merged: far lamps as one, within 1 % of the "
+    "illuminance. auto: merged above 64 lights.",
+)
+@click.option(
+    "--sky-samples",
+    type=click.IntRange(0, 1 << 20),
+    default=0,
+    show_default=True,
+    help="Directions in which surfaces hide the sky from one another; 4096 is good to 2 %. "
+    "0: nothing hides it.",
+)
+@click.option(
+    "--compression",
+    type=click.Choice(["zip", "piz", "htj2k", "none"]),
+    default="zip",
+    show_default=True,
+    help="Of the EXR, lossless. htj2k is small and quick; readers need OpenEXR 3.4.",
 )
 @click.option("--half", is_flag=True, help="Half floats in the EXR; above 65504 they clip.")
 @click.option("--resume", is_flag=True, help="Skip frames whose files are there.")
@@ -183,11 +239,18 @@ def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
         gamma=options["gamma"],
         purposes=_purposes(options["purposes"]),
         mask=(options["mask"] or "").replace(",", " ").split(),
+        variants=options["variants"],
+        level=COMPLEXITIES[options["complexity"]],
         session_layer=options["session_layer"],
         settings=options["render_settings_prim_path"],
         default_sky=not options["disable_camera_light"],
         sky_visible=options["enable_dome_light_visibility"],
+        samples=options["samples"],
+        shadows=options["shadows"] == "maps",
+        lights=options["lights"],
+        sky_samples=options["sky_samples"],
         half=options["half"],
+        compression=options["compression"],
         resume=options["resume"],
     )
 

@@ -12,7 +12,7 @@ import os
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +33,16 @@ _PIXELS_A_BYTE = 10_000
 
 #: The last chunk's name and checksum (PNG, ISO/IEC 15948, 11.2.5).
 _PNG_END = b"IEND\xaeB`\x82"
+
+#: Lossless compressions: zip for every reader; htj2k for small files soon, which readers
+#: before OpenEXR 3.4 do not know.
+Compression = Literal["zip", "piz", "htj2k", "none"]
+_COMPRESSIONS: dict[str, Any] = {
+    "zip": OpenEXR.ZIP_COMPRESSION,
+    "piz": OpenEXR.PIZ_COMPRESSION,
+    "htj2k": OpenEXR.HTJ2K256_COMPRESSION,
+    "none": OpenEXR.NO_COMPRESSION,
+}
 
 #: The largest finite half float.
 HALF_MAX = 65504.0
@@ -114,18 +124,19 @@ def write_exr(
     *,
     half: bool = False,
     luminance: bool = True,
+    compression: Compression = "zip",
 ) -> None:
     """Write linear Rec. 709 RGB or RGBA, (h, w, 3 or 4), top row first.
 
     ``luminance``: the values are cd/m2 and the header says so; False for
     reflectance maps. ``attributes``: further header entries (str, int, float,
     NumPy arrays of 9 or 16 floats). ``half``: half floats; what is beyond +-65504 is
-    written as that (``half_clipped`` counts it).
+    written as that (``half_clipped`` counts it). ``compression`` loses nothing.
     """
     dtype = np.float16 if half else np.float32
     pixels = np.ascontiguousarray(np.clip(rgb, -HALF_MAX, HALF_MAX) if half else rgb, dtype)
     header: dict[str, Any] = {
-        "compression": OpenEXR.ZIP_COMPRESSION,
+        "compression": _COMPRESSIONS[compression],
         "type": OpenEXR.scanlineimage,
         "chromaticities": REC709,
         "software": "hdrusd",

@@ -18,16 +18,17 @@ from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
 from hdrusd.display import Display, Writer
 from hdrusd.errors import HdrusdError, InputError, SourceRef
 from hdrusd.frames import frame_path
-from hdrusd.gpu.hdr import HdrRenderer, Reflection
+from hdrusd.gpu.hdr import HdrRenderer, LightMode, Reflection
 from hdrusd.gpu.program import Programs
-from hdrusd.images import half_clipped, read_image, write_exr, write_png
+from hdrusd.images import Compression, half_clipped, write_exr, write_png
 from hdrusd.report import Kind, Report
-from hdrusd.scene import Camera, ImageData, TextureRef
+from hdrusd.scene import Camera
 from hdrusd.tonemap.operator import DEFAULT_OPERATOR, OPERATORS, Operator, Parameters, Statistics
 from hdrusd.units import TEXTURE_GAMMA
-from hdrusd.usd.assets import asset_bytes
 from hdrusd.usd.extract import StageReader
 from hdrusd.usd.settings import read_settings
+from hdrusd.usd.textures import TextureLoader
+from hdrusd.usd.variants import select_variants
 
 #: Width of a picture that neither the stage nor the user sizes (usdrecord's).
 DEFAULT_WIDTH = 960
@@ -53,11 +54,18 @@ class Job:
     gamma: float = TEXTURE_GAMMA
     purposes: Sequence[str] = ("render",)
     mask: Sequence[str] = ()
+    variants: Sequence[str] = ()  # PRIM:SET=NAME each
+    level: int = 0  # refinements of subdivision cages and curves
     session_layer: Path | None = None
     settings: str | None = None  # path of a RenderSettings prim
     default_sky: bool = True
     sky_visible: bool = False
+    samples: int = 1  # a pixel
+    shadows: bool = True
+    lights: LightMode = "auto"
+    sky_samples: int = 0  # directions in which the sky may be hidden; 0: it is seen everywhere
     half: bool = False
+    compression: Compression = "zip"
     resume: bool = False
 
 
@@ -79,14 +87,19 @@ def open_stage(
     mask: Sequence[str] = (),
     session: Path | None = None,
     report: Report | None = None,
+    variants: Sequence[str] = (),
 ) -> Usd.Stage:
-    """Open a stage, all of it or what ``mask`` names.
+    """Open a stage, all of it or what ``mask`` names, with these ``variants`` (PRIM:SET=NAME).
 
     ``report``: takes what USD warns of (arcs that lead nowhere or in a circle), which
     otherwise goes to standard error. Raises InputError.
     """
     paths = [_mask_path(path, name) for name in mask]
     root, over = _layer(path), None if session is None else _layer(session)
+    if variants:  # over the user's session layer, which is a file and stays as it is
+        choices = Sdf.Layer.CreateAnonymous("session.usda")
+        choices.subLayerPaths = [] if over is None else [over.identifier]
+        over = choices
     layers = [root, over] if over is not None else [root]
     with usd_warnings(path, report):
         try:
@@ -96,6 +109,7 @@ def open_stage(
                 stage = Usd.Stage.Open(*layers)
         except Tf.ErrorException as problem:
             raise InputError(path, f"not a USD stage ({_one_line(problem)})") from problem
+        select_variants(stage, variants, SourceRef(path))
     for target in paths:
         if report is not None and not stage.GetPrimAtPath(target):
             report.add(Kind.MISSING, "mask", SourceRef(path), str(target), "no such prim")
@@ -148,52 +162,38 @@ def _one_line(problem: Exception) -> str:
     return " ".join(text.split())[:200].strip("' ")
 
 
-class TextureLoader:
-    """Decodes textures for the GPU; what is missing or broken is a finding, once."""
-
-    def __init__(self, stage: Path, report: Report) -> None:
-        self.place = SourceRef(stage)
-        self.report = report
-
-    def __call__(self, ref: TextureRef) -> ImageData | None:
-        if not ref.file:
-            return None
-        try:
-            inside = asset_bytes(ref.file) if "[" in ref.file else None
-            return read_image(Path(ref.file), inside)
-        except (InputError, OSError) as problem:
-            self.report.add(
-                Kind.MISSING,
-                "texture-unreadable",
-                self.place,
-                Path(ref.file).name,
-                f"{problem}; its fallback value is shown",
-            )
-            return None
-
-
 class Renderer:
     """A stage and a device; frames in any order."""
 
     def __init__(self, ctx: moderngl.Context, job: Job, report: Report) -> None:
         self.job = job
         self.report = report
-        self.stage = open_stage(job.stage, job.mask, job.session_layer, report)
+        self.stage = open_stage(job.stage, job.mask, job.session_layer, report, job.variants)
         self.settings = read_settings(self.stage, job.settings)
         self.reader = StageReader(
-            self.stage, report, purposes=job.purposes, default_sky=job.default_sky
+            self.stage,
+            report,
+            purposes=job.purposes,
+            default_sky=job.default_sky,
+            level=job.level,
         )
         self.camera_path = job.camera or self.settings.camera
         self.size = self._size()
+        limit = int(ctx.info["GL_MAX_TEXTURE_SIZE"])
+        self.textures = TextureLoader(job.stage, report, limit)
         programs = Programs(ctx)
         try:
             self.hdr = HdrRenderer(
                 ctx,
                 programs,
                 self.size,
-                TextureLoader(job.stage, report),
+                self.textures,
                 reflection=job.reflection,
                 gamma=job.gamma,
+                samples=job.samples,
+                shadows=job.shadows,
+                lights=job.lights,
+                sky_samples=job.sky_samples,
             )
         except moderngl.Error as problem:
             width, height = self.size
@@ -223,6 +223,7 @@ class Renderer:
         self._check_camera(camera)
         scene = self.reader.read(time, camera, sky_visible=self.job.sky_visible)
         texture = self.hdr.render(scene)
+        self.textures.publish()
         statistics, ldr = None, None
         if self.display is not None:
             parameters = self._parameters(self.display.operator, camera)
@@ -308,7 +309,14 @@ def render_sequence(ctx: moderngl.Context, job: Job, report: Report) -> Iterator
                 if job.half and (clipped := half_clipped(frame.hdr)):
                     text = f"{clipped} pixels are clipped at 65504 cd/m2, where half floats end"
                     report.add(Kind.CLAMPED, "half-clipped", SourceRef(path), "", text)
-                writer.submit(write_exr, path, frame.hdr, header, half=job.half)
+                writer.submit(
+                    write_exr,
+                    path,
+                    frame.hdr,
+                    header,
+                    half=job.half,
+                    compression=job.compression,
+                )
             if job.png is not None and frame.ldr is not None:
                 writer.submit(write_png, frame_path(job.png, time), frame.ldr)
             yield Frame(frame.time, frame.hdr, frame.ldr, frame.statistics, frame.camera, files)

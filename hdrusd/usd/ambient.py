@@ -1,8 +1,9 @@
-"""The sky of a stage: ``read_ambient``, lux from everywhere alike."""
+"""The sky of a stage: ``read_ambient``, lux from everywhere alike, and domes with pictures."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,10 @@ from pxr import Sdf, Usd, UsdGeom
 
 from hdrusd.errors import SourceRef
 from hdrusd.report import Kind, Report
+from hdrusd.scene import RGB, Sky
+from hdrusd.usd.dome import dome_picture, read_sky
 from hdrusd.usd.light import read_dome
 
-RGB = tuple[float, float, float]
 API = "HdrusdAmbientAPI"
 
 
@@ -25,14 +27,21 @@ def has_ambient(stage: Usd.Stage) -> bool:
 
 
 def read_ambient(
-    stage: Usd.Stage, domes: Iterable[Usd.Prim], time: Usd.TimeCode, report: Report
-) -> RGB:
-    """Illuminance per channel (lx) under open sky.
+    stage: Usd.Stage,
+    domes: Iterable[Usd.Prim],
+    cache: UsdGeom.XformCache,
+    report: Report,
+    *,
+    sky_visible: bool = False,
+) -> tuple[RGB, tuple[Sky, ...]]:
+    """Illuminance per channel (lx) under open sky, and the skies beside it.
 
     Our AmbientAPI, unless every dome that stands for it is hidden, and the domes
-    that it does not stand for. What is negative or not finite is left out.
+    that it does not stand for, at the cache's time. What is negative or not finite is
+    left out.
     """
-    total = np.zeros(3)
+    time = cache.GetTime()
+    total, skies = np.zeros(3), list[Sky]()
     spoken_for: set[Sdf.Path] = set()
     if has_ambient(stage):
         root = stage.GetDefaultPrim()
@@ -43,11 +52,24 @@ def read_ambient(
             spoken_for.update(targets)
             if shown or not targets:
                 total += _sound(stated, root, report)
-    for prim in domes:
-        if prim.GetPath() not in spoken_for and _visible(prim, time):
-            lux = np.asarray(read_dome(prim, time, report) or (0.0, 0.0, 0.0))
-            total += _sound(lux, prim, report)
-    r, g, b = (float(v) for v in total)
+    for prim in (dome for dome in domes if _visible(dome, time)):
+        if prim.GetPath() in spoken_for:
+            if dome_picture(prim, time):
+                text = f"{API} stands for this dome; its picture is not shown"
+                report.add(Kind.DROPPED, "dome-texture", _place(prim), str(prim.GetPath()), text)
+            continue
+        lux = np.asarray(read_dome(prim, time, report) or (0.0, 0.0, 0.0))
+        lux = _sound(lux, prim, report)
+        sky = read_sky(prim, time, _rgb(lux), cache.GetLocalToWorldTransform(prim), report)
+        if sky is None:
+            total += lux
+        else:
+            skies.append(replace(sky, visible=sky_visible))
+    return _rgb(total), tuple(skies)
+
+
+def _rgb(values: npt.NDArray[np.float64]) -> RGB:
+    r, g, b = (float(v) for v in values)
     return r, g, b
 
 
@@ -66,10 +88,13 @@ def _stated(root: Usd.Prim, time: Usd.TimeCode) -> npt.NDArray[np.float64] | Non
 def _sound(lux: npt.NDArray[np.float64], prim: Usd.Prim, report: Report) -> npt.NDArray[np.float64]:
     if np.isfinite(lux).all() and (lux >= 0.0).all():
         return lux
-    place = SourceRef(Path(prim.GetStage().GetRootLayer().identifier))
     text = "not finite or negative; left out"
-    report.add(Kind.INVALID, "light-invalid", place, str(prim.GetPath()), text)
+    report.add(Kind.INVALID, "light-invalid", _place(prim), str(prim.GetPath()), text)
     return np.zeros(3)
+
+
+def _place(prim: Usd.Prim) -> SourceRef:
+    return SourceRef(Path(prim.GetStage().GetRootLayer().identifier))
 
 
 def _visible(prim: Usd.Prim, time: Usd.TimeCode) -> bool:

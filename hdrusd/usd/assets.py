@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pxr import Ar, Sdf, Usd
+from pxr import Ar, Sdf, Usd, UsdShade
 
 
 def resolved_asset(attribute: Usd.Attribute, asset: Sdf.AssetPath) -> str:
     """The path that an asset attribute resolves to; what it says when nothing is there.
 
-    A path inside a package keeps USD's form, ``car.usdz[textures/a.png]``.
+    A path inside a package keeps USD's form, ``car.usdz[textures/a.png]``. One with
+    ``<UDIM>`` names no file: it is what leads to its tiles.
     """
     if asset.resolvedPath:
         return str(asset.resolvedPath)
+    tiled = UsdShade.UdimUtils.IsUdimIdentifier(asset.path)
     for spec in attribute.GetPropertyStack(Usd.TimeCode.Default()):
+        if tiled and (found := UsdShade.UdimUtils.ResolveUdimPath(asset.path, spec.layer)):
+            return str(found)
         anchored = Sdf.ComputeAssetPathRelativeToLayer(spec.layer, asset.path)
         resolved = Ar.GetResolver().Resolve(anchored)
         return str(resolved) if resolved else anchored

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
-from hdrusd.report import Report
+from hdrusd.errors import SourceRef
+from hdrusd.report import Kind, Report
 from hdrusd.scene import Geometry, Material
 from hdrusd.usd.preview import MaterialReader
 
@@ -27,19 +29,25 @@ class Bindings:
 
     def __init__(self, stage: Usd.Stage, report: Report) -> None:
         self.materials: list[Material] = []
-        self._ids: dict[Sdf.Path | str, int] = {}
+        self.report = report
+        self.place = SourceRef(Path(stage.GetRootLayer().identifier))
+        self._ids: dict[_Worn, int] = {}
         self._reader = MaterialReader(stage, report)
-        self._varying: dict[int, UsdShade.Material] = {}
+        self._read_as: dict[Sdf.Path, Material] = {}
+        self._varying: dict[Sdf.Path, UsdShade.Material] = {}
 
     def update(self, code: Usd.TimeCode) -> None:
         """Read again what may have changed since the last frame."""
-        for index, material in self._varying.items():
-            self.materials[index] = self._reader.read(material, code) or Material()
+        for path, material in self._varying.items():
+            self._read_as[path] = self._reader.read(material, code) or Material()
+        for worn, index in self._ids.items():
+            if worn.material in self._varying:
+                self.materials[index] = worn.dress(self._read_as[worn.material])
 
     def pieces(self, prim: Usd.Prim, code: Usd.TimeCode) -> list[Piece]:
         """The material of each face: subsets of family materialBind, and the rest."""
         binding = UsdShade.MaterialBindingAPI(prim)
-        subsets = list(binding.GetMaterialBindSubsets())
+        subsets = list(binding.GetMaterialBindSubsets()) if prim.IsA(UsdGeom.Mesh) else []
         whole = Piece(None, self._material(prim, binding, code))
         if not subsets:
             return [whole]
@@ -62,24 +70,80 @@ class Bindings:
         self, prim: Usd.Prim, binding: UsdShade.MaterialBindingAPI, code: Usd.TimeCode
     ) -> int:
         bound, _ = binding.ComputeBoundMaterial()
-        key = bound.GetPath() if bound else _display_color(prim)
-        if key not in self._ids:
-            self._ids[key] = len(self.materials)
-            self.materials.append(self._read(bound, str(key), code))
-            if bound and _varies(bound.GetPrim()):
-                self._varying[self._ids[key]] = bound
-        return self._ids[key]
+        worn, material = self._bound(bound, prim, code) if bound else self._bare(prim, code)
+        if worn not in self._ids:
+            self._ids[worn] = len(self.materials)
+            self.materials.append(worn.dress(material))
+        return self._ids[worn]
 
-    def _read(self, bound: UsdShade.Material, primvar: str, code: Usd.TimeCode) -> Material:
-        if bound:
-            return self._reader.read(bound, code) or Material()
-        return Material(diffuse=(1.0, 1.0, 1.0), vertex_color=primvar) if primvar else Material()
+    def _bound(
+        self, bound: UsdShade.Material, prim: Usd.Prim, code: Usd.TimeCode
+    ) -> tuple[_Worn, Material]:
+        path = bound.GetPath()
+        if path not in self._read_as:
+            self._read_as[path] = self._reader.read(bound, code) or Material()
+            if _varies(bound.GetPrim()):
+                self._varying[path] = bound
+        material = self._read_as[path]
+        opacity = self._opacity(prim, material.vertex_opacity, code)
+        colored = not material.vertex_color or _has(prim, material.vertex_color)
+        if not colored:
+            text = f"no primvar {material.vertex_color}; what stands for it is used"
+            self._finding(prim, Kind.MISSING, "primvar-missing", text)
+        return _Worn(path, colored=colored, opacity=opacity), material
+
+    def _bare(self, prim: Usd.Prim, code: Usd.TimeCode) -> tuple[_Worn, Material]:
+        """Without a material: what displayColor and displayOpacity say."""
+        opacity = self._opacity(prim, "displayOpacity", code)
+        material = Material(vertex_opacity="displayOpacity", presence=True)
+        if not _has(prim, "displayColor"):
+            return _Worn(None, colored=False, opacity=opacity), material
+        colored = replace(material, diffuse=(1.0, 1.0, 1.0), vertex_color="displayColor")
+        return _Worn(None, colored=True, opacity=opacity), colored
+
+    def _opacity(self, prim: Usd.Prim, name: str, code: Usd.TimeCode) -> float | None:
+        """The opacity that a gprim's primvar gives it as a whole; None where it has none."""
+        if not name or not _has(prim, name):
+            return None
+        value = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name).ComputeFlattened(code)
+        values = np.ravel(np.asarray(value if value is not None else []))
+        if values.size == 0 or values.dtype.kind not in "fiu" or not np.isfinite(values).all():
+            self._finding(prim, Kind.INVALID, "display-opacity", f"{name} is no finite number")
+            return None
+        low, mean = float(values.min()), float(np.clip(values, 0.0, 1.0).mean())
+        if low != float(values.max()):
+            text = f"{name} varies over the gprim; its mean {mean:.3g} is used"
+            self._finding(prim, Kind.REPLACED, "display-opacity", text)
+        return mean
+
+    def _finding(self, prim: Usd.Prim, kind: Kind, code: str, text: str) -> None:
+        self.report.add(kind, code, self.place, str(prim.GetPath()), text)
 
 
-def _display_color(prim: Usd.Prim) -> str:
-    """The primvar that colours a gprim without a material; "" where there is none."""
-    color = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("displayColor")
-    return "displayColor" if color and color.HasValue() else ""
+@dataclass(frozen=True, slots=True)
+class _Worn:
+    """A material as one gprim wears it: which of the primvars it reads are there."""
+
+    material: Sdf.Path | None
+    colored: bool
+    opacity: float | None
+
+    def dress(self, material: Material) -> Material:
+        """The material with what its primvars say about the whole gprim."""
+        if material.vertex_color and not self.colored:
+            r, g, b = (d * a for d, a in zip(material.diffuse, material.vertex_absent, strict=True))
+            material = replace(material, diffuse=(r, g, b), vertex_color="")
+        if self.opacity is not None:
+            material = replace(material, opacity=self.opacity, opacity_map=None)
+        through = material.opacity < 1.0 or material.opacity_map is not None
+        blend = through and material.opacity_threshold <= 0.0
+        presence = blend and material.presence
+        return replace(material, vertex_opacity="", blend=blend, presence=presence)
+
+
+def _has(prim: Usd.Prim, name: str) -> bool:
+    primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
+    return bool(primvar) and bool(primvar.HasValue())
 
 
 def _varies(material: Usd.Prim) -> bool:

@@ -142,6 +142,9 @@ def read_light_row(
     axis = -np.array(rotation.GetRow(2), np.float64)
     axis /= max(float(np.linalg.norm(axis)), 1e-12)
     row["axis"] = axis
+    for index, name in enumerate(("x", "y")):
+        side = np.array(world.GetRow3(index), np.float64)
+        row[name] = side / max(float(np.linalg.norm(side)), 1e-12)
     row["intensity"] = strength * color
     row["outer"], row["inner"] = NO_CONE, NO_CONE
     if reading.kind == "distant":
@@ -163,13 +166,13 @@ def read_light_row(
 def read_dome(
     prim: Usd.Prim, time: Usd.TimeCode, report: Report
 ) -> tuple[float, float, float] | None:
-    """Illuminance per channel (lx) of a dome light under open sky; None for any other prim."""
+    """Illuminance per channel (lx) of a dome light under open sky; None for any other prim.
+
+    A picture (``usd/dome.py``) multiplies it.
+    """
     reading = read_lux(prim, time, world=Gf.Matrix4d(1.0), meters_per_unit=1.0)
     if reading is None or reading.kind != "dome":
         return None
-    texture = prim.GetAttribute("inputs:texture:file")
-    if texture and texture.Get() and texture.Get().path:
-        _finding(report, prim, "dome-texture", "dome texture is not read; its colour is uniform")
     strength, color = _photometric(prim, reading, time, report)
     _note_unused(prim, time, report)
     r, g, b = (float(strength * c) for c in color)
@@ -241,9 +244,6 @@ def _read_shaping(
         row["outer"] = np.minimum(row["outer"], outer)
         row["inner"] = np.minimum(row["inner"], outer * (1.0 - min(max(softness, 0.0), 1.0)))
     row["exponent"] += max(focus, 0.0)
-    profile = shaping.GetShapingIesFileAttr().Get(time)
-    if profile and profile.path:
-        _finding(report, prim, "ies-profile", f"{profile.path}: profile is not read")
     tint = shaping.GetShapingFocusTintAttr().Get(time)
     if tint is not None and any(tint):
         _finding(report, prim, "focus-tint", "focus tint is not shown")

@@ -136,6 +136,8 @@ def _write_common(
         network.number("opacity", material.alpha)
     if material.alpha_mode == "mask":
         network.number("opacityThreshold", material.alpha_cutoff)
+    else:  # what blends fades whole, highlight and glow with it: OpenGL's and glTF's alpha
+        network.token("opacityMode", "presence")
 
 
 class _Network:
@@ -166,6 +168,9 @@ class _Network:
         self, name: str, value: float, kind: Sdf.ValueTypeName = Sdf.ValueTypeNames.Float
     ) -> None:
         self.surface.CreateInput(name, kind).Set(value)
+
+    def token(self, name: str, value: str) -> None:
+        self.surface.CreateInput(name, Sdf.ValueTypeNames.Token).Set(value)
 
     def scalar(self, name: str, used: Map, factor: float) -> None:
         """One channel of a texture, times ``factor``."""

@@ -1,19 +1,20 @@
-"""Meshes: ``write_mesh`` from the legacy record, ``read_geometry`` into corner arrays."""
+"""Meshes: ``write_mesh`` from the legacy record, ``read_mesh`` as a surface."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 from pxr import Sdf, Usd, UsdGeom, Vt
 
-from hdrusd.errors import SourceRef
 from hdrusd.legacy.scene import Mesh
-from hdrusd.report import Kind, Report
-from hdrusd.scene import Geometry
-from hdrusd.usd.shapes import read_shape
+from hdrusd.report import Kind
+from hdrusd.usd.arrays import integers, rows
+from hdrusd.usd.cage import Polygons, refined_cage
+from hdrusd.usd.skel import Skin
+from hdrusd.usd.subdivision import Refined
+from hdrusd.usd.surface import Note, Surface
 from hdrusd.usd.triangles import Corners, corners, face_normals, smooth_normals
 
 Floats = npt.NDArray[np.float32]
@@ -54,175 +55,171 @@ def write_mesh(stage: Usd.Stage, path: Sdf.Path, mesh: Mesh) -> Usd.Prim:
     return prim.GetPrim()
 
 
-def time_varying(prim: Usd.Prim) -> bool:
-    """Whether the shape itself (not its place) may change between frames."""
-    names = ("points", "normals", "faceVertexIndices", "faceVertexCounts", "size", "radius")
-    attributes = [prim.GetAttribute(n) for n in (*names, "height", "width", "length")]
-    attributes += [pv.GetAttr() for pv in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithValues()]
+def topology_varies(prim: Usd.Prim) -> bool:
+    """Whether faces and what subdivides them may change between frames."""
+    names = ("faceVertexIndices", "faceVertexCounts", "holeIndices", "creaseIndices")
+    more = ("creaseLengths", "creaseSharpnesses", "cornerIndices", "cornerSharpnesses")
+    attributes = [prim.GetAttribute(name) for name in (*names, *more, "orientation")]
     return any(a and a.ValueMightBeTimeVarying() for a in attributes)
 
 
-class GeometryReader:
-    """One gprim at one time, from which the triangles of any set of faces are cut."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Topology:
+    """What of a mesh is not in its points: faces, refined as often as was asked for."""
 
-    def __init__(self, prim: Usd.Prim, time: Usd.TimeCode, report: Report) -> None:
-        self.prim = prim
-        self.time = time
-        self.report = report
-        self.faces = 0
-        self.points: Floats = np.zeros((0, 3), np.float32)
-        self.triangles: Corners | None = None
-        self._normals: Callable[[Corners], Floats] = lambda tri: face_normals(self.points, tri)
-        shape = read_shape(prim, time)
-        if shape is not None:
-            self.points, self.faces = shape.points, len(shape.counts)
-            self.triangles = corners(shape.counts, shape.indices, left_handed=self._left_handed())
-            if shape.normals is not None:
-                normals = shape.normals
-                self._normals = lambda tri: normals[tri.vertex.ravel()]
-        elif prim.IsA(UsdGeom.Mesh):
-            self._read_mesh(UsdGeom.Mesh(prim))
-
-    def _left_handed(self) -> bool:
-        orientation = UsdGeom.Gprim(self.prim).GetOrientationAttr().Get(self.time)
-        return bool(orientation == UsdGeom.Tokens.leftHanded)
-
-    def _read_mesh(self, mesh: UsdGeom.Mesh) -> None:
-        time = self.time
-        points = _rows(mesh.GetPointsAttr().Get(time), 3)
-        counts, indices = (
-            _integers(a.Get(time))
-            for a in (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr())
-        )
-        if points is not None:
-            self.points = points.astype(np.float32)
-        self.faces = counts.size
-        try:
-            tri = corners(counts, indices, left_handed=self._left_handed())
-        except ValueError as problem:
-            self._finding(Kind.INVALID, "mesh-topology", f"{problem}; not drawn")
-            return
-        bad = (tri.vertex < 0) | (tri.vertex >= len(self.points))
-        if bad.any():
-            self._finding(Kind.INVALID, "mesh-index", "faces name points that are not there; left")
-            keep = ~bad.any(axis=1)
-            tri = Corners(tri.vertex[keep], tri.corner[keep], tri.face[keep])
-        index = _integers(mesh.GetHoleIndicesAttr().Get(time))
-        if index.size:
-            solid = np.ones(self.faces, np.bool_)
-            solid[index[(index >= 0) & (index < self.faces)]] = False
-            tri = tri.select(solid)
-        finite: npt.NDArray[np.bool_] = np.asarray(np.isfinite(self.points).all(axis=1))
-        if not finite.all():
-            self._finding(
-                Kind.INVALID, "mesh-not-finite", "points are not finite; their faces left"
-            )
-            keep = finite[tri.vertex].all(axis=1)
-            tri = Corners(tri.vertex[keep], tri.corner[keep], tri.face[keep])
-            self.points = np.where(finite[:, None], self.points, 0.0).astype(np.float32)
-        self.triangles = tri
-        self._choose_normals(mesh)
-
-    def _choose_normals(self, mesh: UsdGeom.Mesh) -> None:
-        """primvars:normals, then normals; else flat for polygons, smooth for a subdivision cage."""
-        primvar = UsdGeom.PrimvarsAPI(self.prim).GetPrimvar("normals")
-        if primvar and primvar.HasValue():
-            values, stated = _rows(primvar.ComputeFlattened(self.time), 3), True
-            interpolation = str(primvar.GetInterpolation())
-        else:
-            given = mesh.GetNormalsAttr().Get(self.time)
-            values, stated = _rows(given, 3), bool(given)
-            interpolation = str(mesh.GetNormalsInterpolation())
-        smooth = mesh.GetSubdivisionSchemeAttr().Get() != UsdGeom.Tokens.none
-
-        def normals(tri: Corners) -> Floats:
-            taken = None if values is None else tri.take(values, interpolation)
-            if taken is None:
-                if stated:
-                    text = "normals do not fit the mesh; computed"
-                    self._finding(Kind.INVALID, "mesh-normals", text)
-                return (smooth_normals if smooth else face_normals)(self.points, tri)
-            length = np.linalg.norm(taken.astype(np.float64), axis=1)
-            usable = (length > 1e-9) & (length < 1e9)  # False for NaN; float32 can square these
-            if not usable.all():
-                text = "normals without a direction; those of the faces are used there"
-                self._finding(Kind.INVALID, "mesh-normals", text)
-                taken = np.where(usable[:, None], taken, face_normals(self.points, tri))
-            return taken
-
-        self._normals = normals
-
-    def cut(
-        self,
-        key: str,
-        faces: npt.NDArray[np.bool_] | None,
-        uv_sets: list[str],
-        color: str,
-        version: int,
-    ) -> Geometry | None:
-        """Corner arrays of the faces marked (all when None); None when nothing is left."""
-        tri = self.triangles
-        if tri is None:
-            return None
-        if faces is not None:
-            tri = tri.select(faces)
-        if tri.face.size == 0:
-            return None
-        uvs = {name: values for name in uv_sets if (values := self._uv(tri, name)) is not None}
-        colors = {}
-        if color and (values := self._primvar(tri, color, 3)) is not None:
-            colors[color] = self._reflecting(values, color)
-        return Geometry(
-            key=key,
-            version=version,
-            points=np.ascontiguousarray(self.points[tri.vertex.ravel()]),
-            normals=self._normals(tri),
-            uvs=uvs,
-            colors=colors,
-        )
-
-    def _reflecting(self, values: Floats, name: str) -> Floats:
-        """Vertex colours as factors on a reflectance: finite and not negative."""
-        if np.isfinite(values).all() and (values >= 0.0).all():
-            return values
-        self._finding(Kind.INVALID, "color-invalid", f"{name} is not finite or negative; 0 there")
-        return np.maximum(np.nan_to_num(values, posinf=0.0, neginf=0.0), 0.0)
-
-    def _uv(self, tri: Corners, name: str) -> Floats | None:
-        values = self._primvar(tri, name, 2)
-        if values is None:
-            self._finding(
-                Kind.MISSING, "uv-missing", f"no usable primvar {name} for its texture; 0 is used"
-            )
-        return values
-
-    def _primvar(self, tri: Corners, name: str, width: int) -> Floats | None:
-        primvar = UsdGeom.PrimvarsAPI(self.prim).FindPrimvarWithInheritance(name)
-        if not primvar or not primvar.HasValue():
-            return None
-        values = _rows(primvar.ComputeFlattened(self.time), width)
-        if values is None:
-            return None
-        return tri.take(values[:, :width], str(primvar.GetInterpolation()))
-
-    def _finding(self, kind: Kind, code: str, text: str) -> None:
-        place = SourceRef(Path(self.prim.GetStage().GetRootLayer().identifier))
-        self.report.add(kind, code, place, str(self.prim.GetPath()), text)
+    size: int  # points that it was made for
+    indices: npt.NDArray[np.int64]  # the point of each corner, as the prim has them
+    triangles: Corners  # of the finest level; ``face`` counts those of the prim
+    refined: Refined | None  # where a subdivision scheme is followed
+    kept: npt.NDArray[np.int64]  # corners of the prim that are in ``refined``
+    smooth: bool  # a subdivision cage: its normals are smooth
 
 
-def _rows(value: object, width: int) -> npt.NDArray[np.generic] | None:
-    """An array attribute as (n, at least ``width``) numbers; None where it is anything else.
+def read_topology(
+    mesh: UsdGeom.Mesh, time: Usd.TimeCode, size: int, level: int, note: Note
+) -> Topology | None:
+    """The faces of a mesh with ``size`` points, refined ``level`` times if it is a cage.
 
-    A layer may give a schema's attribute another type, and a primvar indices that lead nowhere.
+    What is broken is noted and left out; None where nothing is left to be drawn.
     """
-    array = np.asarray(value if value is not None else [])
-    if array.ndim == 0 or array.size == 0 or array.dtype.kind not in "fiu":
+    counts, indices = (
+        integers(a.Get(time))
+        for a in (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr())
+    )
+    left_handed = mesh.GetOrientationAttr().Get(time) == UsdGeom.Tokens.leftHanded
+    smooth = mesh.GetSubdivisionSchemeAttr().Get() != UsdGeom.Tokens.none
+    try:
+        tri = corners(counts, indices, left_handed=left_handed)
+    except ValueError as problem:
+        note(Kind.INVALID, "mesh-topology", f"{problem}; not drawn")
         return None
-    rows = array.reshape(len(array), -1)
-    return rows if rows.shape[1] >= width else None
+    bad = (indices < 0) | (indices >= size)
+    if bad.any():
+        note(Kind.INVALID, "mesh-index", "faces name points that are not there; left")
+        tri = tri.where(~bad[tri.corner].any(axis=1))
+    holes = integers(mesh.GetHoleIndicesAttr().Get(time))
+    solid = np.ones(counts.size, np.bool_)
+    solid[holes[(holes >= 0) & (holes < counts.size)]] = False
+    refined, kept = None, np.zeros(0, np.int64)
+    if smooth and level > 0:
+        made = refined_cage(mesh, time, Polygons(counts, indices, ~bad, size), level, note)
+        if made is not None:
+            refined, faces, kept, shown = made
+            solid &= shown
+            tri = corners(refined.counts, refined.indices, left_handed=left_handed)
+            tri = Corners(tri.vertex, tri.corner, faces[tri.face])
+    if not solid.all():
+        tri = tri.select(solid)
+    return Topology(size, indices, tri, refined, kept, smooth)
 
 
-def _integers(value: object) -> npt.NDArray[np.int64]:
-    rows = _rows(value, 1)
-    whole = rows is not None and rows.shape[1] == 1 and rows.dtype.kind in "iu"
-    return rows.ravel().astype(np.int64) if rows is not None and whole else np.zeros(0, np.int64)
+def read_mesh(
+    prim: Usd.Prim,
+    time: Usd.TimeCode,
+    note: Note,
+    *,
+    level: int = 0,
+    skin: Skin | None = None,
+    topology: Topology | None = None,
+) -> tuple[Surface, Topology] | None:
+    """The surface of a mesh at a time, and its topology, which serves other times too.
+
+    ``level``: refinements of a subdivision cage. ``topology``: of another time, where it
+    does not vary. None where there is nothing to be drawn.
+    """
+    mesh = UsdGeom.Mesh(prim)
+    given = rows(mesh.GetPointsAttr().Get(time), 3)
+    points = np.zeros((0, 3), np.float32) if given is None else given[:, :3].astype(np.float32)
+    if topology is None or topology.size != len(points):
+        topology = read_topology(mesh, time, len(points), level, note)
+    if topology is None:
+        return None
+    if skin is not None:
+        points = skin.points(points, time)
+    normals = _given_normals(mesh, time, topology, skin)
+    if topology.refined is not None:
+        spoilt = ~np.isfinite(points)
+        points[spoilt] = np.nan  # which, unlike infinity, is no error in a sum
+        points = topology.refined.vertex(points)
+    tri = topology.triangles
+    finite: npt.NDArray[np.bool_] = np.asarray(np.isfinite(points).all(axis=1))
+    if not finite.all():
+        note(Kind.INVALID, "mesh-not-finite", "points are not finite; their faces left")
+        tri = tri.where(finite[tri.vertex].all(axis=1))
+        points = np.where(finite[:, None], points, np.float32(0.0))
+    surface = Surface(
+        points,
+        tri,
+        lambda some: _normals(points, topology, normals, some, note),
+        lambda values, interpolation, some: _expand(mesh, topology, values, interpolation, some),
+    )
+    return surface, topology
+
+
+#: Values and their interpolation, and whether the prim states any at all.
+_Normals = tuple[npt.NDArray[np.generic] | None, str, bool]
+
+
+def _given_normals(
+    mesh: UsdGeom.Mesh, time: Usd.TimeCode, topology: Topology, skin: Skin | None
+) -> _Normals:
+    """primvars:normals, then normals, turned by the skin; a refined cage has its own."""
+    if topology.refined is not None:
+        return None, "", False
+    primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals")
+    if primvar and primvar.HasValue():
+        values, stated = rows(primvar.ComputeFlattened(time), 3), True
+        interpolation = str(primvar.GetInterpolation())
+    else:
+        given = mesh.GetNormalsAttr().Get(time)
+        values, stated = rows(given, 3), bool(given)
+        interpolation = str(mesh.GetNormalsInterpolation())
+    if values is None or skin is None:
+        return values, interpolation, stated
+    vertices = topology.indices if interpolation == "faceVarying" else np.arange(topology.size)
+    if interpolation in ("uniform", "constant") or len(values) != len(vertices):
+        return None, interpolation, False  # of no point: computed from the moved ones
+    turned = skin.normals(values[:, :3].astype(np.float32), vertices, topology.size, time)
+    return turned, interpolation, turned is not None
+
+
+def _normals(
+    points: Floats, topology: Topology, given: _Normals, tri: Corners, note: Note
+) -> Floats:
+    """Those given; else flat for polygons, smooth for a subdivision cage."""
+    values, interpolation, stated = given
+    taken = None if values is None else tri.take(values, interpolation)
+    if taken is None:
+        if stated:
+            note(Kind.INVALID, "mesh-normals", "normals do not fit the mesh; computed")
+        return (smooth_normals if topology.smooth else face_normals)(points, tri)
+    square = np.einsum("ij,ij->i", taken, taken, dtype=np.float64)
+    usable = (square > 1e-18) & (square < 1e18)  # False for NaN; float32 can square these
+    if not usable.all():
+        text = "normals without a direction; those of the faces are used there"
+        note(Kind.INVALID, "mesh-normals", text)
+        taken = np.where(usable[:, None], taken, face_normals(points, tri))
+    return taken
+
+
+def _expand(
+    mesh: UsdGeom.Mesh,
+    topology: Topology,
+    values: npt.NDArray[np.generic],
+    interpolation: str,
+    tri: Corners,
+) -> Floats | None:
+    """Values of a primvar at the corners of some triangles."""
+    refined = topology.refined
+    if refined is not None and len(values) > 1:
+        if interpolation in ("vertex", "varying"):
+            if len(values) < topology.size:
+                return None
+            way = refined.vertex if interpolation == "vertex" else refined.varying
+            values = way(values[: topology.size])
+        elif interpolation == "faceVarying":
+            if len(values) < len(topology.indices):
+                return None
+            rule = str(mesh.GetFaceVaryingLinearInterpolationAttr().Get())
+            values = refined.face_varying(values[topology.kept], rule)
+    return tri.take(values, interpolation)

@@ -1,29 +1,46 @@
-"""``read_material``: a UsdPreviewSurface network, and our schema over it, as shader 1 wants it."""
+"""``MaterialReader``: a material's network, and our schema over it, as shader 1 wants it.
+
+UsdPreviewSurface and the nodes that come with it, after the UsdPreviewSurface
+specification (OpenUSD, docs/spec_usdpreviewsurface.rst, version 2.5) and the shader
+definitions of OpenUSD 26.11, which add ``opacityMode``. MaterialX is in materialx.py.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from textwrap import shorten
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-from pxr import Gf, Sdf, Usd, UsdShade
+from pxr import Gf, Usd, UsdShade
 
 from hdrusd.errors import SourceRef
 from hdrusd.report import Kind, Report
 from hdrusd.scene import RGB, Material, TextureRef, TextureUse
-from hdrusd.usd.assets import resolved_asset
-from hdrusd.usd.lux import connection_end
+from hdrusd.usd.ggx import build_material, f0_from_ior, level_fallback, note_clearcoat
+from hdrusd.usd.materialx import is_materialx_surface, read_materialx
+from hdrusd.usd.network import (
+    EIGHT_BIT,
+    MAX_UV_SETS,
+    Findings,
+    Node,
+    Signal,
+    Values,
+    constant_place,
+    rows,
+    surface_nodes,
+    transform_2d,
+)
 
 #: Exponent range that a roughness maps to; at 1e5 the lobe is half a degree wide.
 _MAX_SHININESS = 1e5
 
-#: Inputs of UsdPreviewSurface that shader 1 has no term for yet, with the value that means "off".
-_UNUSED = {"clearcoat": 0.0, "displacement": 0.0, "occlusion": 1.0}
+_CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
 
-_CHANNELS = {"rgb": -1, "r": 0, "g": 1, "b": 2, "a": 3, "rgba": -1}
+#: What an 8-bit normal map needs to become a direction, in the words of the specification.
+_NORMAL_SCALE, _NORMAL_BIAS = (2.0, 2.0, 2.0, 1.0), (-1.0, -1.0, -1.0, 0.0)
 
 
 def shininess_from_roughness(roughness: float) -> float:
@@ -46,239 +63,189 @@ class MaterialReader:
 
     def read(self, material: UsdShade.Material, time: Usd.TimeCode) -> Material | None:
         """The material at ``time``, or None when it has no surface that we know."""
-        prim = material.GetPrim()
-        shader = _surface_shader(material)
-        if shader is None or shader.GetIdAttr().Get() != "UsdPreviewSurface":
-            what = shader.GetIdAttr().Get() if shader else "no surface"
-            self._finding(prim, "material-unknown", f"{what}; want UsdPreviewSurface; grey is used")
+        findings = Findings(self.report, self.place, material.GetPrim())
+        nodes = surface_nodes(material, time)
+        made = next((m for n in nodes if (m := _read(n, findings)) is not None), None)
+        if made is None:
+            what = nodes[0].id or "a node without id" if nodes else "no surface"
+            text = f"{what}; want UsdPreviewSurface or a surface of MaterialX; grey is used"
+            findings.finding("material-unknown", text)
             return None
-        surface = _Node(shader, time)
-        self._note_unused(prim, surface)
-        diffuse, diffuse_map = self._color(prim, surface, "diffuseColor", (0.18, 0.18, 0.18))
-        emission, emission_map = self._color(prim, surface, "emissiveColor", (0.0, 0.0, 0.0))
-        opacity_map = self._texture(prim, surface, "opacity")
-        opacity = self._number(prim, surface, "opacity", 1.0)
-        threshold = self._number(prim, surface, "opacityThreshold", 0.0)
-        if threshold <= 0.0 and (opacity < 1.0 or opacity_map is not None):
-            lens = opacity_map is None and (emission_map is not None or any(emission))
-            threshold = 0.0 if lens else 0.5  # a lamp behind its glass must not be cut away
-            how = "solid, for it glows" if lens else "as a cut-out at opacity 0.5"
-            self._finding(prim, "alpha-blend", f"blending is drawn {how}", Kind.REPLACED)
-        specular, metallic = self._specular(prim, surface)
-        roughness = self._factor(prim, surface, "roughness", 0.5)
-        shininess = shininess_from_roughness(roughness)
-        ours = _Photometric(prim, time)
-        if ours.shininess is not None:
-            shininess = ours.shininess
-        if ours.specular is not None:
-            specular, metallic = ours.specular, 0.0
-        primvar = _primvar(surface, "diffuseColor")
-        if primvar and primvar == ours.vertex_color and ours.diffuse is not None:
-            diffuse = ours.diffuse  # R = D V; the network has no node that multiplies
-        return Material(
-            diffuse=diffuse,
-            diffuse_map=diffuse_map,
-            vertex_color=ours.vertex_color or primvar,
-            specular=specular,
-            shininess=shininess,
-            metallic=metallic,
-            emission=emission,
-            emission_map=emission_map,
-            opacity=opacity,
-            opacity_map=opacity_map,
-            opacity_threshold=threshold,
-        )
+        made = _photometric(made, _Photometric(material.GetPrim(), time))
+        if len(made.uv_sets()) > MAX_UV_SETS:
+            text = f"{len(made.uv_sets())} texture coordinate sets; {MAX_UV_SETS} are read"
+            findings.finding("uv-sets", text)
+        return made
 
-    def _specular(self, prim: Usd.Prim, surface: _Node) -> tuple[RGB, float]:
+
+def _read(surface: Node, findings: Findings) -> Material | None:
+    if surface.id == "UsdPreviewSurface":
+        return _Preview(findings).read(surface)
+    if is_materialx_surface(surface.id):
+        return read_materialx(surface, findings)
+    return None
+
+
+class _Preview:
+    """One UsdPreviewSurface network."""
+
+    def __init__(self, findings: Findings) -> None:
+        self.findings = findings
+
+    def read(self, surface: Node) -> Material:
+        findings, signal = self.findings, partial(self._signal, surface)
+        self._note_displacement(surface)
+        ior = self._ior(surface)
         if surface.value("useSpecularWorkflow", 0) == 1:
-            color, used = self._color(prim, surface, "specularColor", (0.0, 0.0, 0.0))
-            if used is not None:
-                self._finding(prim, "specular-texture", "specularColor texture is not used")
-            return color, 0.0
-        ior = max(self._number(prim, surface, "ior", 1.5), 0.0)
-        f0 = ((1.0 - ior) / (1.0 + ior)) ** 2
-        return (f0, f0, f0), self._factor(prim, surface, "metallic", 0.0)
-
-    def _factor(self, prim: Usd.Prim, surface: _Node, name: str, default: float) -> float:
-        """An input from 0 to 1; a texture on it has no term yet, and the default holds."""
-        if self._texture(prim, surface, name) is not None:
-            self._finding(prim, f"{name}-texture", f"{name} texture is not used; {default} is")
-            return default
-        return min(max(self._number(prim, surface, name, default), 0.0), 1.0)
-
-    def _number(self, prim: Usd.Prim, node: _Node, name: str, default: float) -> float:
-        (value,) = self._numbers(prim, node, name, (default,))
-        return value
-
-    def _numbers(
-        self, prim: Usd.Prim, node: _Node, name: str, default: tuple[float, ...]
-    ) -> tuple[float, ...]:
-        """Finite numbers; the default where a layer gives the input something else."""
-        value = node.value(name, default)
-        array = np.ravel(np.asarray(value))
-        if array.dtype.kind in "fiub" and len(array) == len(default) and np.isfinite(array).all():
-            return tuple(float(v) for v in array)
-        text = f"{name} {shorten(str(value), 60)}; want {len(default)} finite numbers"
-        self._finding(prim, "value-invalid", text, Kind.INVALID)
-        return default
-
-    def _note_unused(self, prim: Usd.Prim, surface: _Node) -> None:
-        for name, off in _UNUSED.items():
-            used = surface.connected(name)
-            if used or abs(self._number(prim, surface, name, off) - off) > 1e-6:
-                self._finding(prim, f"{name}-unused", f"{name} is not shown")
-        if surface.connected("normal"):
-            self._finding(prim, "normal-map-unused", "normal map is not shown")
-
-    def _color(
-        self, prim: Usd.Prim, surface: _Node, name: str, default: RGB
-    ) -> tuple[RGB, TextureUse | None]:
-        """A colour input as (constant, texture). A primvar on diffuseColor is a factor on white."""
-        if _primvar(surface, name):
-            if name == "diffuseColor":
-                return (1.0, 1.0, 1.0), None
-            self._finding(prim, "node-unknown", f"{name}: primvar is not read; {default} is used")
-            return default, None
-        value = self._numbers(prim, surface, name, default)
-        r, g, b = (max(v, 0.0) for v in value)
-        if (r, g, b) != value:
-            self._finding(prim, "color-invalid", f"{name} {value}; want 0 or more", Kind.INVALID)
-        return (r, g, b), self._texture(prim, surface, name)
-
-    def _texture(self, prim: Usd.Prim, surface: _Node, name: str) -> TextureUse | None:
-        source = surface.source(name)
-        if source is None:
-            return None
-        kind = source.GetIdAttr().Get()
-        if kind != "UsdUVTexture":
-            self._finding(
-                prim, "node-unknown", f"{name}: {kind or 'a node without id'} is not read"
-            )
-            return None
-        texture = _Node(source, surface.time)
-        asset = texture.value("file", None)
-        attribute = texture.producer("file")
-        file = ""
-        if isinstance(asset, Sdf.AssetPath) and asset.path and attribute is not None:
-            file = resolved_asset(attribute, asset)
+            specular, metallic = signal("specularColor", (0.0, 0.0, 0.0)), Signal((0.0,))
         else:
-            self._finding(prim, "texture-missing", f"{name}: texture names no file", Kind.MISSING)
-        space = str(texture.value("sourceColorSpace", "auto"))
-        decode = {"raw": "linear", "sRGB": "gamma"}.get(space, "auto")
-        uv_set, matrix = self._coordinates(prim, texture)
+            specular, metallic = Signal((f0_from_ior(ior),) * 3), signal("metallic", (0.0,))
+        threshold = max(findings.number(surface, "opacityThreshold", 0.0), 0.0)
+        made = build_material(
+            findings,
+            {
+                "diffuse": signal("diffuseColor", (0.18, 0.18, 0.18)),
+                "specular": specular,
+                "metallic": metallic,
+                "roughness": signal("roughness", (0.5,)),
+                "clearcoat": signal("clearcoat", (0.0,)),
+                "clearcoat_roughness": signal("clearcoatRoughness", (0.01,)),
+                "emission": signal("emissiveColor", (0.0, 0.0, 0.0)),
+                "opacity": signal("opacity", (1.0,)),
+                "occlusion": signal("occlusion", (1.0,)),
+            },
+            threshold=threshold,
+            presence=self._presence(surface),
+            normal_map=self._normal(surface),
+        )
+        note_clearcoat(findings, made, ior)
+        return made
+
+    def _ior(self, surface: Node) -> float:
+        if surface.source("ior") is not None:
+            self.findings.finding(
+                "node-unknown", "ior: a texture or primvar is not read; 1.5 is used"
+            )
+            return 1.5
+        return max(self.findings.number(surface, "ior", 1.5), 0.0)
+
+    def _presence(self, surface: Node) -> bool:
+        mode = str(surface.value("opacityMode", "transparent"))
+        if mode not in ("transparent", "presence"):
+            text = f"opacityMode {mode}; want transparent or presence; transparent is used"
+            self.findings.finding("value-invalid", text, Kind.INVALID)
+        return mode == "presence"
+
+    def _note_displacement(self, surface: Node) -> None:
+        value = self.findings.number(surface, "displacement", 0.0)
+        if surface.source("displacement") is not None or value != 0.0:
+            self.findings.finding("displacement-unused", "displacement is not shown")
+
+    # -- inputs --------------------------------------------------------------------------
+
+    def _signal(self, node: Node, name: str, default: Values) -> Signal:
+        """What reaches an input: a texture, a primvar, or its constant."""
+        source = node.source(name)
+        if source is None:
+            return Signal(self.findings.numbers(node, name, default))
+        if source.id == "UsdUVTexture":
+            use = self._texture(source, name, _CHANNELS.get(node.output(name), -1), len(default))
+            return Signal(default, use)
+        if source.id.startswith("UsdPrimvarReader_"):
+            return self._primvar(node, source, name, default)
+        text = f"{name}: {source.id or 'a node without id'} is not read"
+        self.findings.finding("node-unknown", text)
+        return Signal(self.findings.numbers(node, name, default))
+
+    def _primvar(self, node: Node, reader: Node, name: str, default: Values) -> Signal:
+        """A primvar on the colour or the opacity; elsewhere the value that stands for it."""
+        absent = self.findings.numbers(reader, "fallback", (0.0,) * len(default))
+        primvar = str(reader.value("varname", "") or "")
+        if primvar and name == "diffuseColor":
+            return Signal((1.0, 1.0, 1.0), primvar=primvar, absent=absent)
+        if primvar and name == "opacity":
+            return Signal(absent, primvar=primvar, absent=absent)
+        if not reader.authored("fallback"):
+            absent = self.findings.numbers(node, name, default)
+        shown = ", ".join(f"{v:g}" for v in absent)
+        self.findings.finding("node-unknown", f"{name}: primvar is not read; {shown} is used")
+        return Signal(absent)
+
+    def _texture(self, node: Node, name: str, channel: int, width: int) -> TextureUse:
+        findings = self.findings
+        file = findings.file(node, name)
+        data = width == 1 or name == "normal"
+        uv_set, matrix = self._coordinates(node)
+        ref = TextureRef(
+            file=file,
+            decode=self._decode(node, name, file, data and channel != 3),  # type: ignore[arg-type]
+            wrap_s=_wrap(node.value("wrapS", "useMetadata")),
+            wrap_t=_wrap(node.value("wrapT", "useMetadata")),
+        )
         return TextureUse(
-            texture=TextureRef(
-                file=file,
-                decode=decode,  # type: ignore[arg-type]
-                wrap_s=_wrap(texture.value("wrapS", "useMetadata")),
-                wrap_t=_wrap(texture.value("wrapT", "useMetadata")),
-            ),
+            texture=ref,
             uv_set=uv_set,
             matrix=matrix,
-            scale=self._four(prim, texture, "scale", (1.0, 1.0, 1.0, 1.0)),
-            bias=self._four(prim, texture, "bias", (0.0, 0.0, 0.0, 0.0)),
-            channel=_CHANNELS.get(surface.output(name), -1),
-            fallback=self._four(prim, texture, "fallback", (0.0, 0.0, 0.0, 1.0)),
+            scale=findings.four(node, "scale", (1.0, 1.0, 1.0, 1.0)),
+            bias=findings.four(node, "bias", (0.0, 0.0, 0.0, 0.0)),
+            channel=0 if width == 1 and channel < 0 else channel,
+            fallback=findings.four(node, "fallback", (0.0, 0.0, 0.0, 1.0)),
         )
 
-    def _coordinates(self, prim: Usd.Prim, texture: _Node) -> tuple[str, tuple[float, ...]]:
-        """The primvar and the 2 x 3 matrix that lead to the texture's coordinates."""
-        node = texture.source("st")
-        matrix = np.eye(3)
-        for _ in range(8):  # a chain of transforms; more than a few is a loop
-            if node is None:
-                break
-            kind = node.GetIdAttr().Get()
-            inner = _Node(node, texture.time)
-            if kind == "UsdPrimvarReader_float2":
-                name = inner.value("varname", "st")
-                return str(name or "st"), tuple(float(v) for v in matrix[:2].ravel())
-            if kind != "UsdTransform2d":
-                self._finding(prim, "node-unknown", f"st: {kind} is not read; st is used")
-                break
-            matrix = matrix @ transform_2d(
-                self._numbers(prim, inner, "scale", (1.0, 1.0)),
-                self._number(prim, inner, "rotation", 0.0),
-                self._numbers(prim, inner, "translation", (0.0, 0.0)),
-            )
-            node = inner.source("in")
-        return "st", tuple(float(v) for v in matrix[:2].ravel())
+    def _decode(self, node: Node, name: str, file: str, data: bool) -> str:
+        """How codes become numbers. ``auto`` would curve an 8-bit picture that holds data."""
+        space = str(node.value("sourceColorSpace", "auto"))
+        if space in ("raw", "sRGB"):
+            return "linear" if space == "raw" else "gamma"
+        if not data:
+            return "auto"
+        if file.lower().endswith(EIGHT_BIT):
+            text = f"{name}: sourceColorSpace is not stated; read raw, as {name} is no colour"
+            self.findings.finding("data-color-space", text, Kind.ASSUMED)
+        return "linear"
 
-    def _four(
-        self, prim: Usd.Prim, node: _Node, name: str, default: tuple[float, ...]
-    ) -> tuple[float, float, float, float]:
-        r, g, b, a = self._numbers(prim, node, name, default)
-        return r, g, b, a
-
-    def _finding(self, prim: Usd.Prim, code: str, text: str, kind: Kind = Kind.DROPPED) -> None:
-        self.report.add(kind, code, self.place, str(prim.GetPath()), text)
-
-
-def transform_2d(
-    scale: tuple[float, ...], rotation: float, translation: tuple[float, ...]
-) -> npt.NDArray[np.float64]:
-    """UsdTransform2d as a (3, 3) column-vector matrix: scale, rotate (degrees, ccw), move."""
-    c, s = math.cos(math.radians(rotation)), math.sin(math.radians(rotation))
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    matrix = np.asarray(turn @ np.diag([*scale, 1.0]))
-    matrix[:2, 2] = translation
-    return matrix
-
-
-def _primvar(surface: _Node, name: str) -> str:
-    """The primvar that a reader feeds straight into an input; "" where there is none."""
-    source = surface.source(name)
-    if source is None or not str(source.GetIdAttr().Get()).startswith("UsdPrimvarReader_"):
-        return ""
-    return str(_Node(source, surface.time).value("varname", "") or "")
-
-
-def _surface_shader(material: UsdShade.Material) -> UsdShade.Shader | None:
-    """The node behind the surface output of the universal render context."""
-    output = material.GetSurfaceOutput()
-    if not output:
-        return None
-    end = connection_end(output.GetAttr())
-    shader = UsdShade.Shader(end.GetPrim())
-    return shader if shader and end != output.GetAttr() else None
-
-
-class _Node:
-    """A shader node at a time: values and sources through interfaces and node graphs."""
-
-    def __init__(self, shader: UsdShade.Shader, time: Usd.TimeCode) -> None:
-        self.shader = shader
-        self.time = time
-
-    def producer(self, name: str) -> Usd.Attribute | None:
-        """The attribute whose value reaches input ``name``."""
-        own = self.shader.GetPrim().GetAttribute(f"inputs:{name}")
-        return connection_end(own) if own else None
-
-    def value(self, name: str, default: Any) -> Any:
-        attribute = self.producer(name)
-        if attribute is None:
-            return default
-        if UsdShade.Output.IsOutput(attribute):  # connected to a node: its own value, if any
-            attribute = self.shader.GetPrim().GetAttribute(f"inputs:{name}")
-        value = attribute.Get(self.time)
-        return default if value is None else value
-
-    def source(self, name: str) -> UsdShade.Shader | None:
-        """The node that feeds input ``name``, or None for a constant."""
-        attribute = self.producer(name)
-        if attribute is None or not UsdShade.Output.IsOutput(attribute):
+    def _normal(self, surface: Node) -> TextureUse | None:
+        """The normal map, whose texels times scale plus bias are directions in tangent space."""
+        source, flat = surface.source("normal"), (0.0, 0.0, 1.0)
+        if source is None:
+            if self.findings.numbers(surface, "normal", flat) != flat:
+                self.findings.finding("normal-constant", "a normal without a texture is not shown")
             return None
-        shader = UsdShade.Shader(attribute.GetPrim())
-        return shader if shader else None
+        if source.id != "UsdUVTexture":
+            text = f"normal: {source.id or 'a node without id'} is not read"
+            self.findings.finding("node-unknown", text)
+            return None
+        use = self._texture(source, "normal", -1, 3)
+        stated = source.authored("scale") or source.authored("bias")
+        if not stated and use.texture.file.lower().endswith(EIGHT_BIT):
+            text = "normal: 8-bit texture without scale and bias; (2, 2, 2, 1) and (-1, -1, -1, 0)"
+            self.findings.finding("normal-scale", f"{text} are used", Kind.GUESSED)
+            use = replace(use, scale=_NORMAL_SCALE, bias=_NORMAL_BIAS)
+        return use if source.authored("fallback") else level_fallback(use)
 
-    def output(self, name: str) -> str:
-        """Which output of that node: "rgb", "a"."""
-        attribute = self.producer(name)
-        return str(attribute.GetBaseName()) if attribute is not None else ""
-
-    def connected(self, name: str) -> bool:
-        return self.source(name) is not None
+    def _coordinates(self, texture: Node) -> tuple[str, Values]:
+        """The primvar and the 2 x 3 matrix that lead to the texture's coordinates."""
+        findings, matrix, node, name = self.findings, np.eye(3), texture, "st"
+        for _ in range(8):  # a chain of transforms; more than a few is a loop
+            source = node.source(name)
+            if source is None:
+                if node.authored(name):
+                    s, t = findings.numbers(node, name, (0.0, 0.0))
+                    return "st", rows(matrix @ constant_place(s, t))
+                break
+            if source.id == "UsdPrimvarReader_float2":
+                return str(source.value("varname", "") or "st"), rows(matrix)
+            if source.id != "UsdTransform2d":
+                findings.finding("node-unknown", f"st: {source.id} is not read; st is used")
+                return "st", rows(matrix)
+            matrix = matrix @ transform_2d(
+                findings.numbers(source, "scale", (1.0, 1.0)),
+                findings.number(source, "rotation", 0.0),
+                findings.numbers(source, "translation", (0.0, 0.0)),
+            )
+            node, name = source, "in"
+        findings.finding("texture-coordinates", "a texture names none; st is used", Kind.ASSUMED)
+        return "st", rows(matrix)
 
 
 class _Photometric:
@@ -302,6 +269,24 @@ class _Photometric:
         usable = isinstance(shininess, float) and 0.0 <= shininess < math.inf
         self.shininess = min(shininess, _MAX_SHININESS) if usable else None
         self.vertex_color = str(get("photometric:vertexColor") or "")
+
+
+def _photometric(made: Material, ours: _Photometric) -> Material:
+    """The material with our schema over it: a legacy highlight is Blinn and Phong's."""
+    if ours.shininess is not None or ours.specular is not None:
+        shininess = ours.shininess
+        if shininess is None:
+            shininess = shininess_from_roughness(made.roughness)
+        made = replace(made, model="blinn", shininess=shininess)
+    if ours.specular is not None:
+        made = replace(
+            made, specular=ours.specular, specular_map=None, metallic=0.0, metallic_map=None
+        )
+    if ours.vertex_color:
+        if made.vertex_color == ours.vertex_color and ours.diffuse is not None:
+            made = replace(made, diffuse=ours.diffuse)  # R = D V; no node of the network multiplies
+        made = replace(made, vertex_color=ours.vertex_color, vertex_absent=(1.0, 1.0, 1.0))
+    return made
 
 
 def _wrap(mode: Any) -> str:

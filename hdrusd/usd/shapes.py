@@ -1,4 +1,4 @@
-"""UsdGeom's implicit shapes as polygons: Cube, Sphere, Cylinder, Cone, Capsule, Plane."""
+"""UsdGeom's implicit shapes as polygons: Cube, Sphere, Cylinder(_1), Cone, Capsule(_1), Plane."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from pxr import Usd, UsdGeom
+
+from hdrusd.usd.surface import Surface
+from hdrusd.usd.triangles import corners, face_normals
 
 #: Sides of a round shape: at 48 the silhouette is within 0.2 % of the radius.
 SIDES = 48
@@ -45,28 +48,59 @@ def read_shape(prim: Usd.Prim, time: Usd.TimeCode) -> Shape | None:
             shape = kind(prim)
             radius = float(shape.GetRadiusAttr().Get(time))
             height = float(shape.GetHeightAttr().Get(time))
-            return _round(kind, radius, height, shape.GetAxisAttr().Get(time))
+            top = 0.0 if kind is UsdGeom.Cone else radius
+            capped = kind is UsdGeom.Capsule
+            return _round(radius, top, height, shape.GetAxisAttr().Get(time), domes=capped)
+    for kind in (UsdGeom.Cylinder_1, UsdGeom.Capsule_1):
+        if prim.IsA(kind):
+            shape = kind(prim)
+            bottom = float(shape.GetRadiusBottomAttr().Get(time))
+            top = float(shape.GetRadiusTopAttr().Get(time))
+            height = float(shape.GetHeightAttr().Get(time))
+            capped = kind is UsdGeom.Capsule_1
+            return _round(bottom, top, height, shape.GetAxisAttr().Get(time), domes=capped)
     return None
 
 
-def _round(kind: Any, radius: float, height: float, axis: str) -> Shape:
-    """A profile (radius, height, normal's two parts) revolved about the axis."""
+def shape_surface(prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
+    """The surface of an implicit shape at a time; None for any other prim."""
+    shape = read_shape(prim, time)
+    if shape is None:
+        return None
+    left_handed = UsdGeom.Gprim(prim).GetOrientationAttr().Get(time) == UsdGeom.Tokens.leftHanded
+    points, normals = shape.points, shape.normals
+    return Surface(
+        points,
+        corners(shape.counts, shape.indices, left_handed=left_handed),
+        lambda some: (
+            face_normals(points, some) if normals is None else normals[some.vertex.ravel()]
+        ),
+        lambda values, interpolation, some: some.take(values, interpolation),
+    )
+
+
+def _round(bottom: float, top: float, height: float, axis: str, *, domes: bool) -> Shape:
+    """A profile (radius, height, normal's two parts) revolved about the axis.
+
+    ``domes``: half spheres at both ends, else flat discs, none where the radius is 0.
+    """
     h = height / 2
-    if kind is UsdGeom.Cylinder:
-        r, z = [0, radius, radius, radius, radius, 0], [-h, -h, -h, h, h, h]
-        nr, nz = [0.0, 0.0, 1.0, 1.0, 0.0, 0.0], [-1.0, -1.0, 0.0, 0.0, 1.0, 1.0]
-    elif kind is UsdGeom.Cone:
-        slope = float(np.hypot(height, radius)) or 1.0
-        r, z = [0, radius, radius, 0], [-h, -h, -h, h]
-        nr = [0.0, 0.0, height / slope, height / slope]
-        nz = [-1.0, -1.0, radius / slope, radius / slope]
+    slope = float(np.hypot(height, bottom - top)) or 1.0
+    nr, nz = np.full(2, height / slope), np.full(2, (bottom - top) / slope)
+    r, z = np.array([bottom, top]), np.array([-h, h])
+    if domes:
+        angle = np.linspace(0.0, np.pi / 2, SIDES // 4 + 1)
+        cos, sin = np.cos(angle), np.sin(angle)
+        r = np.concatenate([bottom * cos[::-1], r, top * cos])
+        z = np.concatenate([-h - bottom * sin[::-1], z, h + top * sin])
+        nr, nz = np.concatenate([cos[::-1], nr, cos]), np.concatenate([-sin[::-1], nz, sin])
     else:
-        quarter = np.linspace(0.0, np.pi / 2, SIDES // 4 + 1)
-        angle = np.concatenate([-quarter[::-1], quarter])  # both halves have the full circle
-        nr, nz = list(np.cos(angle)), list(np.sin(angle))
-        r = [radius * c for c in nr]
-        z = list(radius * np.sin(angle) + np.repeat([-h, h], len(quarter)))
-    return _revolve(np.array(r, float), np.array(z, float), np.array(nr), np.array(nz), 1.0, axis)
+        r, z = np.array([0.0, bottom, *r]), np.array([-h, -h, *z])
+        nr, nz = np.array([0.0, 0.0, *nr]), np.array([-1.0, -1.0, *nz])
+        if top != 0.0:
+            r, z = np.array([*r, top, 0.0]), np.array([*z, h, h])
+            nr, nz = np.array([*nr, 0.0, 0.0]), np.array([*nz, 1.0, 1.0])
+    return _revolve(r, z, nr, nz, 1.0, axis)
 
 
 def _revolve(

@@ -41,8 +41,14 @@ class Corners:
         return np.ascontiguousarray(values[index], np.float32)
 
     def select(self, faces: npt.NDArray[np.bool_]) -> Corners:
-        """The triangles of the faces marked True."""
-        keep = faces[self.face]
+        """The triangles of the faces marked True; faces without a mark are left out."""
+        if len(faces) <= int(self.face.max(initial=-1)):
+            faces = np.pad(faces, (0, int(self.face.max()) + 1 - len(faces)))
+        return self.where(faces[self.face])
+
+    def where(self, keep: npt.ArrayLike) -> Corners:
+        """The triangles marked True, (t,)."""
+        keep = np.asarray(keep, np.bool_)
         return Corners(self.vertex[keep], self.corner[keep], self.face[keep])
 
 
@@ -70,22 +76,33 @@ def corners(
 
 def face_normals(points: Floats, tri: Corners) -> Floats:
     """Flat normals, (3 t, 3): one direction for a triangle's three corners, not unit length."""
-    a, b, c = (points[tri.vertex[:, i]].astype(np.float64) for i in range(3))
-    normal = np.cross(b - a, c - a)
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    normal /= np.where(length > 0.0, length, 1.0)
-    return np.repeat(normal, 3, axis=0).astype(np.float32)
+    return np.repeat(_directions(_areas(points, tri)), 3, axis=0)
 
 
 def smooth_normals(points: Floats, tri: Corners) -> Floats:
     """Vertex normals, area-weighted over the triangles that meet, (3 t, 3)."""
-    p = points.astype(np.float64)
-    a, b, c = (p[tri.vertex[:, i]] for i in range(3))
-    area = np.cross(b - a, c - a)
+    area = _areas(points, tri)
     total = np.zeros((len(points), 3))
-    for axis in range(3):
-        weights = np.repeat(area[:, axis], 3)
-        total[:, axis] = np.bincount(tri.vertex.ravel(), weights, minlength=len(points))
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    total /= np.where(length > 0.0, length, 1.0)
-    return total[tri.vertex.ravel()].astype(np.float32)
+    for corner in range(3):
+        vertex = tri.vertex[:, corner]
+        for axis in range(3):
+            total[:, axis] += np.bincount(vertex, area[:, axis], minlength=len(points))
+    return _directions(total)[tri.vertex.ravel()]
+
+
+def _areas(points: Floats, tri: Corners) -> npt.NDArray[np.float64]:
+    """(t, 3) area vectors, twice as long as the areas are large."""
+    x, y, z = (points[:, axis].astype(np.float64) for axis in range(3))
+    a, b, c = np.ascontiguousarray(tri.vertex.T)
+    result = np.empty((len(a), 3))
+    for axis, (u, v) in enumerate(((y, z), (z, x), (x, y))):
+        ua, va = u[a], v[a]
+        result[:, axis] = (u[b] - ua) * (v[c] - va) - (v[b] - va) * (u[c] - ua)
+    return result
+
+
+def _directions(vectors: npt.NDArray[np.float64]) -> Floats:
+    """Unit vectors (n, 3) float32; those of no length stay 0."""
+    length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
+    vectors /= np.where(length > 0.0, length, 1.0)[:, None]
+    return vectors.astype(np.float32)

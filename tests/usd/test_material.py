@@ -11,58 +11,19 @@ import pytest
 from builders import new_stage, paint, texture
 from hypothesis import given
 from hypothesis import strategies as st
-from pxr import Gf, Sdf, Usd, UsdShade
+from looks import DIFFUSE, PATH, TYPES, fed, network, read, reader, shown, transform, uv_texture
+from pxr import Gf, Usd, UsdShade
 
 from hdrusd.legacy.scene import UVTransform
 from hdrusd.report import Report
-from hdrusd.scene import Material
 from hdrusd.usd.material import Map, Surface, write_look, write_photometric
+from hdrusd.usd.network import transform_2d
 from hdrusd.usd.preview import (
-    MaterialReader,
     roughness_from_shininess,
     shininess_from_roughness,
-    transform_2d,
 )
 
-PATH = Sdf.Path("/Looks/paint")
-TYPES = Sdf.ValueTypeNames
-
-
-def read(stage: Usd.Stage, report: Report | None = None) -> Material | None:
-    reader = MaterialReader(stage, Report() if report is None else report)
-    return reader.read(UsdShade.Material(stage.GetPrimAtPath(PATH)), Usd.TimeCode(0))
-
-
-def shown(stage: Usd.Stage, report: Report | None = None) -> Material:
-    made = read(stage, report)
-    assert made is not None
-    return made
-
-
-def network(folder: Path, inputs: str, nodes: str = "", *, graph: str = "") -> Usd.Stage:
-    """A material of one UsdPreviewSurface with ``inputs``, and nodes beside it."""
-    file = folder / "look.usda"
-    file.write_text(
-        '#usda 1.0\n(\n    metersPerUnit = 1\n)\ndef Scope "Looks"\n{\n'
-        f'def Material "paint"\n{{\n{graph}\n'
-        "    token outputs:surface.connect = </Looks/paint/Surface.outputs:surface>\n"
-        '    def Shader "Surface"\n    {\n'
-        '        uniform token info:id = "UsdPreviewSurface"\n'
-        f"{inputs}\n        token outputs:surface\n    }}\n{nodes}\n}}\n}}\n"
-    )
-    return Usd.Stage.Open(str(file))
-
-
-def uv_texture(extra: str = "", name: str = "Picture", file: str = "./a.png") -> str:
-    asset = f"asset inputs:file = @{file}@" if file else ""
-    return (
-        f'    def Shader "{name}"\n    {{\n        uniform token info:id = "UsdUVTexture"\n'
-        f"        {asset}\n{extra}\n        float3 outputs:rgb\n        float outputs:r\n"
-        "        float outputs:a\n    }\n"
-    )
-
-
-DIFFUSE = "color3f inputs:diffuseColor.connect = </Looks/paint/Picture.outputs:rgb>"
+RAW = 'token inputs:sourceColorSpace = "raw"'
 
 
 # -- written and read ---------------------------------------------------------------------
@@ -77,7 +38,7 @@ def test_a_legacy_material_there_and_back() -> None:
     made = shown(stage)
     assert made.diffuse == (0.5, 0.25, 0.125)
     assert made.specular == pytest.approx((0.1, 0.2, 0.3))
-    assert (made.shininess, made.metallic) == (32.0, 0.0)
+    assert (made.model, made.shininess, made.metallic) == ("blinn", 32.0, 0.0)
     assert made.emission == (0.0, 0.0, 0.0)
     surface = UsdShade.Material(stage.GetPrimAtPath(PATH)).ComputeSurfaceSource()[0]
     # The plain value for other renderers: roughness = (2 / (n + 2))^(1/4).
@@ -113,9 +74,8 @@ def test_metallic_and_roughness_there_and_back() -> None:
     source = paint(pbr={"metallic": 0.25, "roughness": 0.5})
     write_photometric(stage, PATH, source, Surface((0.5, 0.5, 0.5), 2.2))
     made = shown(stage)
-    assert made.metallic == 0.25
+    assert (made.model, made.metallic, made.roughness) == ("ggx", 0.25, 0.5)
     assert made.specular == pytest.approx((0.04, 0.04, 0.04))  # ior 1.5
-    assert made.shininess == pytest.approx(30.0)  # alpha = 0.25, n = 2 / alpha^2 - 2
 
 
 def test_glossiness_is_one_minus_roughness_and_keeps_its_specular_colour() -> None:
@@ -125,7 +85,7 @@ def test_glossiness_is_one_minus_roughness_and_keeps_its_specular_colour() -> No
     write_photometric(stage, PATH, source, surface)
     made = shown(stage)
     assert made.specular == pytest.approx((0.3, 0.2, 0.1))
-    assert made.shininess == pytest.approx(30.0)
+    assert (made.model, made.roughness) == ("ggx", 0.5)
 
 
 def test_textures_their_wraps_and_coordinates_there_and_back(tmp_path: Path) -> None:
@@ -207,7 +167,9 @@ def test_an_empty_surface_has_usd_preview_surfaces_defaults(tmp_path: Path) -> N
     made = shown(network(tmp_path, ""))
     assert made.diffuse == (0.18, 0.18, 0.18)
     assert made.specular == pytest.approx((0.04, 0.04, 0.04))
-    assert made.shininess == pytest.approx(shininess_from_roughness(0.5))
+    assert (made.model, made.roughness, made.blend) == ("ggx", 0.5, False)
+    assert (made.clearcoat, made.clearcoat_roughness) == (0.0, pytest.approx(0.01))
+    assert (made.occlusion, made.normal_map) == (1.0, None)
     assert (made.opacity, made.metallic, made.emission) == (1.0, 0.0, (0.0, 0.0, 0.0))
 
 
@@ -247,19 +209,11 @@ def test_scale_bias_and_fallback(tmp_path: Path) -> None:
 
 
 def test_transforms_in_a_row_apply_from_the_reader_outwards(tmp_path: Path) -> None:
-    def transform(name: str, source: str, values: str) -> str:
-        return (
-            f'def Shader "{name}"\n{{\n uniform token info:id = "UsdTransform2d"\n'
-            f" float2 inputs:in.connect = </Looks/paint/{source}.outputs:result>\n{values}\n"
-            " float2 outputs:result\n}\n"
-        )
-
     nodes = (
         uv_texture("float2 inputs:st.connect = </Looks/paint/Outer.outputs:result>")
         + transform("Outer", "Inner", "float2 inputs:translation = (1, 0)")
         + transform("Inner", "Reader", "float2 inputs:scale = (2, 2)\nfloat inputs:rotation = 90")
-        + 'def Shader "Reader"\n{\n uniform token info:id = "UsdPrimvarReader_float2"\n'
-        ' string inputs:varname = "map1"\n float2 outputs:result\n}\n'
+        + reader("Reader", "float2", "map1")
     )
     use = shown(network(tmp_path, DIFFUSE, nodes)).diffuse_map
     assert use is not None
@@ -307,10 +261,8 @@ def test_connections_in_circles_and_to_nowhere_end(tmp_path: Path, inputs: str) 
 
 
 def test_texture_coordinates_in_a_circle_end(tmp_path: Path) -> None:
-    nodes = uv_texture("float2 inputs:st.connect = </Looks/paint/T.outputs:result>") + (
-        'def Shader "T"\n{\n uniform token info:id = "UsdTransform2d"\n'
-        " float2 inputs:in.connect = </Looks/paint/T.outputs:result>\n float2 outputs:result\n}\n"
-    )
+    nodes = uv_texture("float2 inputs:st.connect = </Looks/paint/T.outputs:result>")
+    nodes += transform("T", "T")
     use = shown(network(tmp_path, DIFFUSE, nodes)).diffuse_map
     assert use is not None
     assert use.uv_set == "st"
@@ -319,9 +271,13 @@ def test_texture_coordinates_in_a_circle_end(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("inputs", "nodes", "code"),
     [
-        ("float inputs:clearcoat = 0.5", "", "clearcoat-unused"),
+        ("float inputs:clearcoat = 0.5", "", None),
+        ("float inputs:clearcoat = 0.5\nfloat inputs:ior = 1.4", "", "clearcoat-ior"),
+        ("normal3f inputs:normal = (1, 0, 0)", "", "normal-constant"),
+        ("float inputs:roughness = 1.5", "", "value-range"),
         ("float inputs:displacement = 1", "", "displacement-unused"),
-        ("float inputs:opacity = 0.25", "", "alpha-blend"),
+        ("float inputs:opacity = 0.25", "", None),
+        ('token inputs:opacityMode = "thin"', "", "value-invalid"),
         ("color3f inputs:diffuseColor = (-1, 0, 0)", "", "color-invalid"),
         ("color3f inputs:diffuseColor = (nan, 0, 0)", "", "value-invalid"),
         ('string inputs:diffuseColor = "red"', "", "value-invalid"),
@@ -330,31 +286,21 @@ def test_texture_coordinates_in_a_circle_end(tmp_path: Path) -> None:
         ('token inputs:useSpecularWorkflow = "yes"', "", None),
         (DIFFUSE, uv_texture(file=""), "texture-missing"),
         (DIFFUSE, uv_texture("float inputs:scale = 3"), "value-invalid"),
-        (
-            "float inputs:roughness.connect = </Looks/paint/Picture.outputs:r>",
-            uv_texture(),
-            "roughness-texture",
-        ),
-        (
-            "normal3f inputs:normal.connect = </Looks/paint/Picture.outputs:rgb>",
-            uv_texture(),
-            "normal-map-unused",
-        ),
-        (
-            "int inputs:useSpecularWorkflow = 1\n"
-            "color3f inputs:specularColor.connect = </Looks/paint/Picture.outputs:rgb>",
-            uv_texture(),
-            "specular-texture",
-        ),
+        (DIFFUSE, uv_texture("float2 inputs:st"), "texture-coordinates"),
+        (fed("roughness", "float", "r"), uv_texture(), "data-color-space"),
+        (fed("opacity", "float", "a"), uv_texture(), None),  # alpha is never curved
+        (fed("roughness", "float", "r"), uv_texture(file="./a.exr"), None),
+        (fed("normal", "normal3f"), uv_texture(RAW), "normal-scale"),
+        (fed("normal", "normal3f"), uv_texture(RAW, file="./a.exr"), None),
+        (fed("ior", "float", "r"), uv_texture(), "node-unknown"),
         (
             DIFFUSE,
             uv_texture().replace("UsdUVTexture", "ND_noise"),
             "node-unknown",
         ),
         (
-            "color3f inputs:emissiveColor.connect = </Looks/paint/Picture.outputs:rgb>",
-            'def Shader "Picture"\n{\n uniform token info:id = "UsdPrimvarReader_float3"\n'
-            ' string inputs:varname = "glow"\n float3 outputs:rgb\n}\n',
+            fed("emissiveColor", "color3f", "result"),
+            reader("Picture", "float3", "glow"),
             "node-unknown",
         ),
     ],
@@ -372,12 +318,11 @@ def test_what_is_not_shown_is_said(
 
 
 def test_a_primvar_is_a_factor_on_white(tmp_path: Path) -> None:
-    reader = (
-        'def Shader "Picture"\n{\n uniform token info:id = "UsdPrimvarReader_float3"\n'
-        ' string inputs:varname = "displayColor"\n float3 outputs:rgb\n}\n'
-    )
-    made = shown(network(tmp_path, DIFFUSE, reader))
+    inputs = fed("diffuseColor", "color3f", "result")
+    fallback = "float3 inputs:fallback = (0.5, 0.25, 0.125)"
+    made = shown(network(tmp_path, inputs, reader("Picture", "float3", "displayColor", fallback)))
     assert (made.vertex_color, made.diffuse) == ("displayColor", (1.0, 1.0, 1.0))
+    assert made.vertex_absent == (0.5, 0.25, 0.125)
 
 
 def test_another_surface_is_a_finding(tmp_path: Path) -> None:
@@ -386,6 +331,7 @@ def test_another_surface_is_a_finding(tmp_path: Path) -> None:
     shader.SetShaderId("ND_standard_surface")
     report = Report()
     assert read(stage, report) is None
+    assert "ND_standard_surface;" in str(next(iter(report)))
     UsdShade.Material(stage.GetPrimAtPath(PATH)).GetSurfaceOutput().GetAttr().ClearConnections()
     assert read(stage, report) is None
     assert report.codes() == {"material-unknown"}
@@ -397,5 +343,5 @@ def test_broken_photometric_attributes_are_not_used(tmp_path: Path) -> None:
     prim.CreateAttribute("legacy:shininess", TYPES.Float).Set(math.nan)
     prim.CreateAttribute("legacy:specularColor", TYPES.Color3f).Set(Gf.Vec3f(-1, 0, 0))
     made = shown(stage)
-    assert made.shininess == 0.0
+    assert (made.model, made.roughness) == ("ggx", 1.0)
     assert made.specular == pytest.approx((0.04, 0.04, 0.04))

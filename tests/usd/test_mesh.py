@@ -11,7 +11,8 @@ from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
 from hdrusd.report import Report
 from hdrusd.scene import Geometry
-from hdrusd.usd.mesh import GeometryReader, time_varying, write_mesh
+from hdrusd.usd.geometry import GeometryReader, time_varying
+from hdrusd.usd.mesh import write_mesh
 
 SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
 ROOF = np.array([*SQUARE, (0.5, 0.5, 1)], np.float32)

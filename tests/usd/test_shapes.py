@@ -11,7 +11,7 @@ from builders import new_stage
 from pxr import Usd, UsdGeom
 
 from hdrusd.report import Report
-from hdrusd.usd.mesh import GeometryReader
+from hdrusd.usd.geometry import GeometryReader
 from hdrusd.usd.shapes import SIDES, read_shape
 
 TIME = Usd.TimeCode.Default()

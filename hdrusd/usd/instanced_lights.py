@@ -1,0 +1,116 @@
+"""Lamps in point instancers: read once, then moved to all their places at a time."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from pxr import Gf, Usd
+
+from hdrusd.report import Report
+from hdrusd.scene import CYLINDER, DISK, RECT, light_rows
+from hdrusd.usd.instancer import Copies, mixed
+from hdrusd.usd.light import read_light_row
+
+Rows = npt.NDArray[np.void]
+Doubles = npt.NDArray[np.float64]
+
+#: How far a matrix may be from a turn and one scale for all directions, relative.
+_SIMILAR = 1e-6
+
+
+def light_key(prim: Usd.Prim) -> int:
+    """A number of the light by its path, the same in every frame and run."""
+    digest = hashlib.blake2b(str(prim.GetPath()).encode(), digest_size=8).digest()
+    return int.from_bytes(digest, "little", signed=True)
+
+
+def instanced_rows(
+    copies: Copies, time: Usd.TimeCode, meters_per_unit: float, report: Report
+) -> Rows:
+    """(n,) ``scene.LIGHT`` of the copies of a light; what has no row of its own is left out.
+
+    Copies that differ from the first by a turn, a mirror, a place or a scale alike in
+    all directions take its row, moved; a strength that follows the size of the lamp
+    does so by the power that two readings of different size show. The others are read
+    one by one.
+    """
+    key = np.int64(light_key(copies.source)) + mixed(copies.ids)
+    first = copies.transforms[0, :3, :3]
+    solvable = abs(np.linalg.det(first)) > 1e-12 * np.abs(first).max() ** 3
+    rows: list[Rows] = []
+    alone = np.ones(len(key), np.bool_)
+    if solvable:
+        # p' = p first turn: what is between the first copy's space and each one's.
+        turns = np.linalg.inv(first) @ copies.transforms[:, :3, :3]
+        gram = turns @ turns.transpose(0, 2, 1)
+        square = np.trace(gram, axis1=1, axis2=2) / 3.0
+        away = np.abs(gram - square[:, None, None] * np.eye(3)).max(axis=(1, 2))
+        alone = ~((away <= _SIMILAR * square) & (square > 0.0))
+        moved = _moved(copies, ~alone, turns, np.sqrt(square), time, meters_per_unit, report)
+        if moved is None:
+            return light_rows(0)
+        moved["key"] = key[~alone]
+        rows.append(moved)
+    for index in np.flatnonzero(alone):
+        row = _read(copies.source, copies.transforms[index], time, meters_per_unit, report)
+        if row is not None:
+            row["key"] = key[index]
+            rows.append(row)
+    return joined(rows)
+
+
+def joined(rows: Sequence[Rows]) -> Rows:
+    """Arrays of lights as one; np.concatenate compares their fields, which takes longer."""
+    result = light_rows(sum(map(len, rows)))
+    at = 0
+    for part in rows:
+        result[at : at + len(part)] = part
+        at += len(part)
+    return result
+
+
+def _moved(
+    copies: Copies,
+    chosen: npt.NDArray[np.bool_],
+    turns: Doubles,
+    scales: Doubles,
+    time: Usd.TimeCode,
+    meters_per_unit: float,
+    report: Report,
+) -> Rows | None:
+    """The first copy's row at the chosen places; None where it has none."""
+    base = copies.transforms[0]
+    row = _read(copies.source, base, time, meters_per_unit, report)
+    if row is None:
+        return None
+    rows = np.repeat(row, int(chosen.sum()))
+    turns, scales = turns[chosen], scales[chosen]
+    for name in ("axis", "x", "y"):
+        rows[name] = np.einsum("j,kji->ki", row[name][0], turns)
+    units = ["axis"] if row["shape"][0] in (RECT, DISK, CYLINDER) else ["axis", "x", "y"]
+    for name in units:
+        rows[name] /= scales[:, None]
+    if row["w"][0] == 0.0:
+        rows["position"] = -rows["axis"]
+        return rows
+    rows["position"] = copies.transforms[chosen, 3, :3] * meters_per_unit
+    rows["radius"] *= scales
+    if np.abs(scales - 1.0).max(initial=0.0) > _SIMILAR:
+        double = base.copy()
+        double[:3, :3] *= 2.0
+        larger = _read(copies.source, double, time, meters_per_unit, report)
+        if larger is None:
+            return None
+        one, two = float(row["intensity"].max()), float(larger["intensity"].max())
+        power = np.log2(two / one) if one > 0.0 and two > 0.0 else 0.0
+        rows["intensity"] *= (scales**power)[:, None]
+    return rows
+
+
+def _read(
+    prim: Usd.Prim, matrix: Doubles, time: Usd.TimeCode, meters_per_unit: float, report: Report
+) -> Rows | None:
+    return read_light_row(prim, time, Gf.Matrix4d(matrix), meters_per_unit, report)
