@@ -93,6 +93,7 @@ class Sky:
     texture: TextureRef
     factor: RGB
     rotation: tuple[float, ...]  # nine: the dome's X, Y, Z axes in the world, row by row
+    visible: bool = False  # seen where there is no surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +136,9 @@ class Material:
     diffuse: RGB = (0.18, 0.18, 0.18)
     diffuse_map: TextureUse | None = None
     vertex_color: str = ""  # primvar that multiplies the diffuse reflectance
+    # The next two are settled by ``usd`` for each gprim; ``gpu`` need not know them.
+    vertex_absent: RGB = (1.0, 1.0, 1.0)  # in place of that primvar on a mesh without it
+    vertex_opacity: str = ""  # primvar that replaces the opacity on a mesh that has it
     specular: RGB = (0.0, 0.0, 0.0)  # at normal incidence
     specular_map: TextureUse | None = None
     shininess: float = 0.0
@@ -274,3 +278,7 @@ class ImageData:
     pixels: npt.NDArray[np.generic]
     path: Path | None = None
     integers: bool = False  # the file has integer codes: a picture, not light
+    halvings: int = 0  # times its sides are to be halved, once linear: a device has limits
+    #: Of a UDIM texture: images by column and row of the unit square that they cover, (0, 0)
+    #: being tile 1001. Then ``pixels`` is empty.
+    tiles: Mapping[tuple[int, int], ImageData] | None = None

@@ -2,45 +2,68 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.gpu.buffers import corner_buffer, instance_rows, mirrored, weld
+from hdrusd.gpu.buffers import mirrored, split
+from hdrusd.gpu.culling import in_view
+from hdrusd.gpu.materials import MaterialInputs, is_blended, material_inputs
 from hdrusd.gpu.program import Programs
+from hdrusd.gpu.source import Define
+from hdrusd.gpu.surface_batches import (
+    MERGED_TRIANGLES,
+    Batch,
+    Mesh,
+    State,
+    instanced,
+    merged,
+    read_mesh,
+)
 from hdrusd.gpu.textures import TextureCache
-from hdrusd.scene import Draw, Geometry, Material, RenderScene, TextureUse
+from hdrusd.gpu.uniforms import Uniforms, floats
+from hdrusd.scene import Draw, RenderScene
 
-#: Maps of a material: field of scene.Material, name of the define.
-_MAPS = {
-    "diffuse_map": "DIFFUSE_MAP",
-    "emission_map": "EMISSION_MAP",
-    "opacity_map": "OPACITY_MAP",
-}
+Doubles = npt.NDArray[np.float64]
 
 #: Frames for which a buffer that nothing draws is kept.
 _KEEP = 2
 
-Key = tuple[str, int, bool, bool]
+#: Texture units of the two layers that a peeled one lies between, after those of materials.
+_OPAQUE_UNIT, _BEFORE_UNIT = 10, 11
+
+
+@dataclass(frozen=True, slots=True)
+class Between:
+    """What a layer of blended surfaces lies between, both as their G-buffers' ``g_normal``.
+
+    ``opaque``: what is not blended; ``before``: the layer in front, or a texel with a
+    distance of minus infinity.
+    """
+
+    opaque: moderngl.Texture
+    before: moderngl.Texture
 
 
 @dataclass(slots=True)
-class _Uploaded:
-    """One geometry in one material on the GPU, and room for its instances."""
+class _Moving:
+    """A draw that is kept apart because it may change."""
 
-    geometry: Geometry
-    vao: moderngl.VertexArray
-    buffers: tuple[moderngl.Buffer, ...]
-    instances: moderngl.Buffer
-    capacity: int
+    draw: Draw
+    mesh: Mesh
+    batches: list[Batch]
     used: int
 
-    def release(self) -> None:
-        self.vao.release()
-        for buffer in (*self.buffers, self.instances):
-            buffer.release()
+
+@dataclass(frozen=True, slots=True)
+class _Call:
+    batch: Batch
+    instances: int
 
 
 class SurfacePass:
@@ -54,145 +77,242 @@ class SurfacePass:
         self.textures = textures
         self.scale = scale
         self._frame = 0
-        self._kept: dict[Key, _Uploaded] = {}
+        self._scene: RenderScene | None = None
+        self._inputs: list[MaterialInputs] = []
+        self._still: tuple[Draw, ...] = ()
+        self._batches: list[Batch] = []  # of what is still
+        self._moving: dict[tuple[str, int, bool, int, int], _Moving] = {}
+        self._calls: dict[bool, list[_Call]] = {}  # by whether they are blended
+        self._shared: dict[str, bytes] = {}
+        self._uniforms: dict[moderngl.Program, Uniforms] = {}
+        self._programs: dict[tuple[int, bool, tuple[str, ...]], moderngl.Program] = {}
 
-    def draw(self, scene: RenderScene) -> None:
-        """All draws of a scene; depth test on, colour attachments as in gbuffer.frag."""
+    def draw(
+        self,
+        scene: RenderScene,
+        which: Literal["opaque", "blended"] = "opaque",
+        *,
+        sky: npt.NDArray[np.float32] | None = None,
+        extra: bool = False,
+        between: Between | None = None,
+    ) -> None:
+        """The surfaces of a scene; depth test on, colour attachments as in gbuffer.frag.
+
+        ``sky``: (18, 3) coefficients of ``ambient_lux`` (photometry/sky.py) instead of
+        ``scene.ambient``. ``extra``: g_extra is attached, and written. ``between``: only
+        the parts between two layers.
+        """
+        self._prepare(scene)
+        defines: dict[str, Define] = {}
+        shared = dict(self._shared)
+        if sky is not None:
+            defines["SKY"] = 1
+            shared["sky"] = floats(sky)
+        if extra:
+            defines["EXTRA"] = 1
+        if between is not None:
+            defines["PEEL"] = 1
+            between.opaque.use(_OPAQUE_UNIT)
+            between.before.use(_BEFORE_UNIT)
+            shared["opaque"] = np.int32(_OPAQUE_UNIT).tobytes()
+            shared["before"] = np.int32(_BEFORE_UNIT).tobytes()
+            shared["pixel"] = floats([1.0 / side for side in between.opaque.size])
+        self._run(self._calls[which == "blended"], defines, shared)
+
+    def blended(self, scene: RenderScene) -> bool:
+        """Whether anything is in view that something may be seen through."""
+        self._prepare(scene)
+        return bool(self._calls[True])
+
+    # -- what is there, and what of it is seen -------------------------------------------
+
+    def _prepare(self, scene: RenderScene) -> None:
+        """Upload what is new, and choose what the camera may see; once a scene."""
+        if scene is self._scene:
+            return
+        self._scene = scene
         self._frame += 1
-        prepared: set[moderngl.Program] = set()
-        bound = -1
-        for draw in sorted(scene.draws, key=lambda d: d.material):
-            material = scene.materials[draw.material]
-            program = self._program(draw.geometry, material)
-            if program not in prepared:
-                self._prepare(program, scene)
-                prepared.add(program)
-                bound = -1
-            if draw.material != bound:
-                self._use_material(program, material)
-                bound = draw.material
-            self._draw(draw, program, material, scene)
-        self._drop_unused()
+        fits = self._read_materials(scene)
+        still = tuple(draw for draw in scene.draws if not draw.moving)
+        if not fits or not _same(still, self._still):
+            self._build_still(still)
+        batches = [*self._batches]
+        counts: Counter[tuple[str, int, bool, int]] = Counter()
+        for draw in scene.draws:
+            if draw.moving:
+                key = (draw.geometry.key, draw.material, draw.double_sided, draw.links)
+                batches += self._move((*key, counts[key]), draw)
+                counts[key] += 1
+        for old in [k for k, v in self._moving.items() if v.used < self._frame - _KEEP]:
+            _release(self._moving.pop(old).batches)
+        self._choose(scene, batches)
+        self._shared = self._frame_uniforms(scene)
 
-    def _program(self, geometry: Geometry, material: Material) -> moderngl.Program:
-        """The variant for what is there: a map that is not used must cost nothing."""
-        defines = {define: 1 for name, define in _MAPS.items() if getattr(material, name)}
-        if defines:
-            defines["TEXTURED"] = 1
-        if material.vertex_color in geometry.colors:
-            defines["VERTEX_COLOR"] = 1
-        return self.programs.get("gpu/shaders/gbuffer.vert", "gpu/shaders/gbuffer.frag", defines)
+    def _read_materials(self, scene: RenderScene) -> bool:
+        """Whether what was uploaded brings what the materials need."""
+        inputs, fits = [], True
+        self.textures.prepare(scene.materials)
+        for number, material in enumerate(scene.materials):
+            known = self._inputs[number] if number < len(self._inputs) else None
+            if known is None or known.material is not material:
+                new = material_inputs(material, self.textures)
+                fits &= known is not None and new.layout == known.layout
+                self._programs.clear()
+                known = new
+            inputs.append(known)
+        self._inputs = inputs
+        if not fits:
+            for moving in self._moving.values():
+                _release(moving.batches)
+            self._moving.clear()
+        return fits
 
-    def _prepare(self, program: moderngl.Program, scene: RenderScene) -> None:
+    def _build_still(self, draws: tuple[Draw, ...]) -> None:
+        _release(self._batches)
+        self._still, self._batches = draws, []
+        groups: dict[State, list[tuple[Mesh, Doubles]]] = {}
+        for draw in draws:
+            mesh = self._mesh(draw)
+            if mesh is None or not len(draw.transforms):
+                continue
+            state = self._state(draw)
+            if len(mesh.indices) // 3 * len(draw.transforms) > MERGED_TRIANGLES:
+                self._batches += instanced(self.ctx, mesh, draw.transforms, state)
+            else:
+                groups.setdefault(state, []).append((mesh, draw.transforms))
+        for state, group in groups.items():
+            self._batches += merged(self.ctx, group, state)
+
+    def _move(self, key: tuple[str, int, bool, int, int], draw: Draw) -> list[Batch]:
+        """The batches of a draw that may have changed since it was drawn last."""
+        kept = self._moving.get(key)
+        before = kept.draw if kept else None
+        mesh = kept.mesh if kept else None
+        if before is None or before.geometry is not draw.geometry:
+            mesh = self._mesh(draw, mesh)
+        if mesh is None or not len(draw.transforms):
+            return []
+        if kept is None or mesh is not kept.mesh or not self._moved(kept, draw):
+            if kept is not None:
+                _release(kept.batches)
+            batches = list(instanced(self.ctx, mesh, draw.transforms, self._state(draw)))
+            kept = self._moving[key] = _Moving(draw, mesh, batches, self._frame)
+        kept.draw, kept.used = draw, self._frame
+        return kept.batches
+
+    def _moved(self, kept: _Moving, draw: Draw) -> bool:
+        """Whether the batches could follow: not where some turn into mirror images."""
+        if np.array_equal(kept.draw.transforms, draw.transforms):
+            return True
+        flipped = mirrored(draw.transforms)
+        if np.unique(flipped).tolist() != [batch.state.mirrored for batch in kept.batches]:
+            return False
+        for batch in kept.batches:
+            batch.move(kept.mesh, draw.transforms[flipped == batch.state.mirrored])
+        return True
+
+    def _mesh(self, draw: Draw, before: Mesh | None = None) -> Mesh | None:
+        uv_sets, color = self._inputs[draw.material].layout
+        color = color if color in draw.geometry.colors else ""
+        return read_mesh(draw.geometry, uv_sets, color, before)
+
+    def _state(self, draw: Draw) -> State:
+        color = self._inputs[draw.material].material.vertex_color in draw.geometry.colors
+        return State(draw.material, color, draw.double_sided, draw.links)
+
+    def _choose(self, scene: RenderScene, batches: list[Batch]) -> None:
+        """The calls of a frame, in the order of their materials."""
+        self._calls = {False: [], True: []}
+        if not batches:
+            return
+        centres = np.concatenate([batch.centres for batch in batches])
+        radii = np.concatenate([batch.radii for batch in batches])
+        seen = in_view(scene.camera, centres, radii)
+        first = 0
+        for batch in batches:
+            own = seen[first : first + len(batch.radii)]
+            first += len(own)
+            if own.any():
+                blended = is_blended(scene.materials[batch.state.material])
+                self._calls[blended].append(_Call(batch, batch.show(own)))
+        for calls in self._calls.values():
+            calls.sort(key=lambda call: call.batch.state.material)
+
+    def _frame_uniforms(self, scene: RenderScene) -> dict[str, bytes]:
         camera = scene.camera
         rotation = np.eye(4)
         rotation[:3, :3] = camera.rotation()
-        matrix = np.ascontiguousarray(rotation @ camera.projection(), np.float32)
-        program["view_projection"].write(matrix)  # type: ignore[union-attr]
-        set_used(program, "forward", tuple(-np.asarray(camera.back)))
-        set_used(program, "ambient", scene.ambient)
-        set_used(program, "lambert_scale", self.scale)
+        high, low = split(np.asarray(camera.eye, np.float64))
+        return {
+            "view_projection": floats(rotation @ camera.projection()),
+            "forward": floats(-np.asarray(camera.back)),
+            "eye_high": floats(high),
+            "eye_low": floats(low),
+            "ambient": floats(scene.ambient),
+            "lambert_scale": floats(self.scale),
+        }
 
-    def _draw(
-        self, draw: Draw, program: moderngl.Program, material: Material, scene: RenderScene
+    # -- drawing -------------------------------------------------------------------------
+
+    def _run(
+        self, calls: Sequence[_Call], defines: dict[str, Define], shared: dict[str, bytes]
     ) -> None:
         ctx = self.ctx
-        rows = instance_rows(draw, scene.camera)
-        flipped = mirrored(draw)
-        set_used(program, "back_sign", -1.0 if draw.double_sided else 1.0)
-        if draw.double_sided:
-            ctx.disable(moderngl.CULL_FACE)
-        else:
-            ctx.enable(moderngl.CULL_FACE)
-        for mirror in (False, True):
-            chosen = rows[flipped == mirror]
-            if len(chosen) == 0:
-                continue
-            uploaded = self._upload(draw, program, material, mirror, len(chosen))
-            uploaded.instances.write(chosen)
-            set_used(program, "handedness", -1.0 if mirror else 1.0)
-            ctx.front_face = "cw" if mirror else "ccw"
-            uploaded.vao.render(moderngl.TRIANGLES, instances=len(chosen))
+        variant = tuple(sorted(f"{name}{value}" for name, value in defines.items()))
+        told: set[moderngl.Program] = set()
+        bound = -1
+        for call in calls:
+            state = call.batch.state
+            program = self._program(state, variant, defines)
+            uniforms = self._uniforms[program]
+            if program not in told:
+                uniforms.write(shared)
+                told.add(program)
+            if state.material != bound:
+                for unit, image in enumerate(self._inputs[state.material].images):
+                    image.use(unit)
+                bound = state.material
+            uniforms.write(self._inputs[state.material].uniforms)
+            uniforms.write(_SIDES[state.double_sided])
+            if "EXTRA" in defines:
+                uniforms.write({"links": floats(state.links)})
+            if state.double_sided:
+                ctx.disable(moderngl.CULL_FACE)
+            else:
+                ctx.enable(moderngl.CULL_FACE)
+            ctx.front_face = "cw" if state.mirrored else "ccw"
+            vao = call.batch.vertex_array(ctx, program)
+            vao.render(moderngl.TRIANGLES, instances=call.instances)
+        ctx.disable(moderngl.CULL_FACE)
+        ctx.front_face = "ccw"
 
-    def _upload(
-        self, draw: Draw, program: moderngl.Program, material: Material, mirror: bool, count: int
-    ) -> _Uploaded:
-        """The buffers of a draw, anew when its geometry changed or its instances outgrew it."""
-        key = (draw.geometry.key, draw.material, draw.double_sided, mirror)
-        kept = self._kept.get(key)
-        stale = kept is not None and (
-            kept.geometry is not draw.geometry
-            or kept.capacity < count
-            or kept.vao.program != program
-        )
-        if kept is not None and not stale:
-            kept.used = self._frame
-            return kept
-        if kept is not None:
-            kept.release()
-        color = material.vertex_color if material.vertex_color in draw.geometry.colors else ""
-        data, content = corner_buffer(draw.geometry, material.uv_sets(), color)
-        welded, indices = weld(data)
-        vertices, elements = self.ctx.buffer(welded), self.ctx.buffer(indices)
-        instances = self.ctx.buffer(reserve=count * 48)
-        used = [(part, name) for part, name in content if name in program]
-        layout = " ".join(
-            part if name in program else f"{4 * int(part[0])}x" for part, name in content
-        )
-        vao = self.ctx.vertex_array(
-            program,
-            [
-                (vertices, layout, *(name for _, name in used)),
-                (instances, "4f 4f 4f /i", "in_row0", "in_row1", "in_row2"),
-            ],
-            elements,
-        )
-        buffers = (vertices, elements)
-        self._kept[key] = _Uploaded(draw.geometry, vao, buffers, instances, count, self._frame)
-        return self._kept[key]
+    def _program(
+        self, state: State, variant: tuple[str, ...], defines: dict[str, Define]
+    ) -> moderngl.Program:
+        key = state.material, state.color, variant
+        if key not in self._programs:
+            own = self._inputs[state.material].defines | defines
+            if state.color:
+                own["VERTEX_COLOR"] = 1
+            files = "gpu/shaders/gbuffer.vert", "gpu/shaders/gbuffer.frag"
+            program = self._programs[key] = self.programs.get(*files, own)
+            if program not in self._uniforms:
+                self._uniforms[program] = Uniforms(program)
+        return self._programs[key]
 
-    def _drop_unused(self) -> None:
-        for key in [k for k, v in self._kept.items() if v.used < self._frame - _KEEP]:
-            self._kept.pop(key).release()
 
-    def _use_material(self, program: moderngl.Program, material: Material) -> None:
-        for name in (
-            "diffuse",
-            "specular",
-            "shininess",
-            "metallic",
-            "emission",
-            "opacity",
-            "opacity_threshold",
-        ):
-            set_used(program, name, getattr(material, name))
-        uv_sets = material.uv_sets()
-        for unit, name in enumerate(_MAPS):
-            use: TextureUse | None = getattr(material, name)
-            if use is not None:
-                self._use_map(program, name, unit, use, min(uv_sets.index(use.uv_set), 3))
+#: What a back face does with its normal.
+_SIDES = {False: {"back_sign": floats(1.0)}, True: {"back_sign": floats(-1.0)}}
 
-    def _use_map(
-        self, program: moderngl.Program, name: str, unit: int, use: TextureUse, uv: int
-    ) -> None:
-        uploaded = self.textures.get(use.texture)
-        scale, bias = np.asarray(use.scale), np.asarray(use.bias)
-        matrix: npt.NDArray[np.float64] = np.reshape(use.matrix, (2, 3)).astype(np.float64)
-        if uploaded is None:  # the texture's fallback, through the same scale and bias
-            bias = np.asarray(use.fallback) * scale + bias
-            scale = np.zeros(4)
-            self.textures.blank.use(unit)
-        else:
-            matrix = matrix * np.reshape(uploaded.scale, (2, 1))
-            matrix[:, 2] += uploaded.offset
-            uploaded.texture.use(unit)
-        set_used(program, name.replace("_map", "_image"), unit)
-        set_used(program, f"{name}.uv", uv)
-        set_used(program, f"{name}.u", tuple(matrix[0]))
-        set_used(program, f"{name}.v", tuple(matrix[1]))
-        set_used(program, f"{name}.scale", tuple(scale))
-        set_used(program, f"{name}.bias", tuple(bias))
-        set_used(program, f"{name}.channel", use.channel)
+
+def _same(a: Sequence[Draw], b: Sequence[Draw]) -> bool:
+    """Whether two lists hold the very same draws."""
+    return len(a) == len(b) and all(x is y for x, y in zip(a, b, strict=True))
+
+
+def _release(batches: Sequence[Batch]) -> None:
+    for batch in batches:
+        batch.release()
 
 
 def set_used(program: moderngl.Program, name: str, value: object) -> None:

@@ -11,7 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.gpu.hdr import HdrRenderer
+from hdrusd.gpu.peeling import Peeling
 from hdrusd.gpu.program import Programs
+from hdrusd.gpu.surfaces import SurfacePass
+from hdrusd.gpu.textures import TextureCache
 from hdrusd.scene import (
     Camera,
     Draw,
@@ -126,9 +129,9 @@ class Rendered:
     position: Array  # m, world
     normal: Array
     diffuse: Array
-    shininess: Array
+    shininess: Array  # or the code of GGX
     specular: Array
-    opacity: Array
+    metallic: Array
 
 
 def rays(camera: Camera, size: tuple[int, int] = (WIDTH, HEIGHT)) -> tuple[Array, Array]:
@@ -152,7 +155,8 @@ def render(
     **options: Any,
 ) -> Rendered:
     """One frame of 64 x 48 pixels by shader 1."""
-    renderer = HdrRenderer(gl, Programs(gl), (WIDTH, HEIGHT), load, **options)
+    # Without shadows, unless asked for: the pixels are what the formulas say of them alone.
+    renderer = HdrRenderer(gl, Programs(gl), (WIDTH, HEIGHT), load, **{"shadows": False, **options})
     renderer.render(scene)
     normal, diffuse, specular, hdr = (
         renderer.layer(name).astype(np.float64)
@@ -168,8 +172,63 @@ def render(
         diffuse=diffuse[..., :3],
         shininess=diffuse[..., 3],
         specular=specular[..., :3],
-        opacity=specular[..., 3],
+        metallic=specular[..., 3],
     )
+
+
+#: Targets of gbuffer.frag, in the order of their locations.
+TARGETS = ("g_normal", "g_diffuse", "g_specular", "hdr", "g_extra")
+
+
+def gbuffer(
+    gl: moderngl.Context,
+    scene: RenderScene,
+    load: Callable[[TextureRef], ImageData | None] = lambda _: None,
+    sky: Array | None = None,
+) -> dict[str, Array]:
+    """The G-buffer of the opaque surfaces with all its targets, (h, w, 4), top row first."""
+    surfaces = SurfacePass(gl, Programs(gl), TextureCache(gl, load, 2.2), 1.0 / np.pi)
+    textures = _opaque(gl, scene, surfaces, sky)
+    gl.extra["framebuffer"].use()
+    return {name: _pixels(texture) for name, texture in textures.items()}
+
+
+def layers(
+    gl: moderngl.Context,
+    scene: RenderScene,
+    load: Callable[[TextureRef], ImageData | None] = lambda _: None,
+) -> tuple[list[dict[str, Array]], Array, Peeling]:
+    """G-buffers of the blended layers, nearest first, and all of it (h, w, 4) without lamps."""
+    programs = Programs(gl)
+    surfaces = SurfacePass(gl, programs, TextureCache(gl, load, 2.2), 1.0 / np.pi)
+    textures = _opaque(gl, scene, surfaces, None)
+    peeling = Peeling(gl, programs, (WIDTH, HEIGHT))
+    found = []
+    for layer in peeling.layers(scene, surfaces, textures["g_normal"]):
+        parts = {name: _pixels(texture) for name, texture in layer.textures.items()}
+        found.append(parts | {"hdr": _pixels(layer.hdr)})
+    peeling.merge(gl.framebuffer([textures["hdr"]]))
+    gl.extra["framebuffer"].use()
+    return found, _pixels(textures["hdr"]), peeling
+
+
+def _opaque(
+    gl: moderngl.Context, scene: RenderScene, surfaces: SurfacePass, sky: Array | None
+) -> dict[str, moderngl.Texture]:
+    textures = [gl.texture((WIDTH, HEIGHT), 4, dtype="f4") for _ in TARGETS]
+    target = gl.framebuffer(textures, gl.depth_texture((WIDTH, HEIGHT)))
+    target.use()
+    target.clear(depth=1.0)
+    gl.enable_only(moderngl.DEPTH_TEST)
+    gl.depth_func = "<"
+    surfaces.draw(scene, sky=sky, extra=True)
+    gl.enable_only(moderngl.NOTHING)
+    return dict(zip(TARGETS, textures, strict=True))
+
+
+def _pixels(texture: moderngl.Texture) -> Array:
+    flat = np.frombuffer(texture.read(), np.float32)
+    return flat.reshape(HEIGHT, WIDTH, 4)[::-1].astype(np.float64)
 
 
 def lit_quad(camera: Camera | None = None, **material: Any) -> RenderScene:

@@ -126,17 +126,21 @@ def test_matrix_of_the_coordinates(gl: Any) -> None:
 
 @pytest.mark.parametrize("channel", [0, 1, 2, 3])
 def test_one_channel_of_an_opacity_map(gl: Any, channel: int) -> None:
-    made = scene(Material(opacity_map=texture(channel=channel), emission=(1.0, 1.0, 1.0)))
+    use = texture(channel=channel)
+    made = scene(Material(opacity_map=use, opacity_threshold=0.5, emission=(1.0, 1.0, 1.0)))
     got = shown(gl, made)
-    wanted = bilinear(PICTURE, coordinates(made, got.surface), "repeat", "repeat")[:, channel]
-    np.testing.assert_allclose(got.opacity[got.surface], wanted, atol=2 * FILTER)
+    whole = shown(gl, scene(Material(emission=(1.0, 1.0, 1.0))))
+    st = coordinates(made, whole.surface)
+    wanted = bilinear(PICTURE, st, "repeat", "repeat")[:, channel]
+    sure = np.abs(wanted - 0.5) > 2 * FILTER
+    np.testing.assert_array_equal(got.surface[whole.surface][sure], wanted[sure] > 0.5)
 
 
 def test_three_maps_with_a_coordinate_set_each(gl: Any) -> None:
     material = Material(
         diffuse_map=texture(uv_set="plain"),
         emission_map=texture(uv_set="turned"),
-        opacity_map=texture(uv_set="small", channel=3),
+        specular_map=texture(uv_set="small"),
     )
     sets = {"plain": lambda s: s, "turned": lambda s: s[:, ::-1], "small": lambda s: 0.5 * s}
     made = scene(material, **sets)
@@ -145,7 +149,7 @@ def test_three_maps_with_a_coordinate_set_each(gl: Any) -> None:
     for shown_value, place, part in (
         (got.diffuse, st, slice(0, 3)),
         (got.frame, st[:, ::-1], slice(0, 3)),
-        (got.opacity[..., None], 0.5 * st, slice(3, 4)),
+        (got.specular, 0.5 * st, slice(0, 3)),
     ):
         wanted = bilinear(PICTURE, place, "repeat", "repeat")[:, part]
         np.testing.assert_allclose(shown_value[got.surface], wanted, atol=2 * FILTER)
@@ -220,9 +224,9 @@ def test_8_bit_codes(gl: Any, decode: str, channels: int, exponent: float) -> No
 def test_alpha_is_never_curved(gl: Any) -> None:
     picture = np.full((2, 2, 4), 100, np.uint8)
     use = texture(decode="gamma", channel=3)
-    made = scene(Material(opacity_map=use, emission=(1.0, 1.0, 1.0)))
+    made = scene(Material(metallic_map=use))
     got = shown(gl, made, {"a.exr": picture})
-    np.testing.assert_allclose(got.opacity[got.surface], 100 / 255, rtol=2**-11)
+    np.testing.assert_allclose(got.metallic[got.surface], 100 / 255, rtol=2**-11)
 
 
 def test_own_gamma(gl: Any) -> None:

@@ -285,7 +285,7 @@ def test_new_version_of_a_geometry_is_shown(gl: Any) -> None:
     from hdrusd.gpu.hdr import HdrRenderer
     from hdrusd.gpu.program import Programs
 
-    renderer = HdrRenderer(gl, Programs(gl), (WIDTH, HEIGHT), lambda _: None)
+    renderer = HdrRenderer(gl, Programs(gl), (WIDTH, HEIGHT), lambda _: None, shadows=False)
     first = lit_quad()
     renderer.render(first)
     seen = renderer.read().any(axis=-1).sum()

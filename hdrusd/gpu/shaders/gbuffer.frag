@@ -1,88 +1,158 @@
 // What a pixel shows before any lamp: G-buffer, and emission plus ambient in cd/m2.
-// Variants by #define (DIFFUSE_MAP, EMISSION_MAP, OPACITY_MAP): a texture that is not used must
-// not be sampled, and a software device samples both sides of a branch.
+// Variants by #define: what is not there must cost nothing, and a software device executes
+// both sides of a branch. NAME_MAP is what a texture adds to a field: nothing, or
+// "+ texel(k).rgb * name_scale"; the field itself is then the bias.
 #include "photometry/reflectance.glsl"
+#include "photometry/sky.glsl"
 
 in float depth;
 in vec3 normal;
 #ifdef VERTEX_COLOR
 in vec3 color;
 #endif
-#ifdef TEXTURED
+
+// -- textures: FETCHES of them, UV_SETS says which texture coordinates each takes -----------
+#ifdef FETCHES
 in vec4 uv01;
 in vec4 uv23;
+uniform sampler2D images[FETCHES];
+uniform vec3 image_u[FETCHES];  // u' = dot(u, (s, t, 1))
+uniform vec3 image_v[FETCHES];
+const int uv_sets[FETCHES] = UV_SETS;
 
-struct Map {
-    int uv;          // texture coordinate set, 0 to 3
-    vec3 u;          // u' = dot(u, (s, t, 1))
-    vec3 v;
-    vec4 scale;
-    vec4 bias;
-    int channel;     // -1: rgb; 0 to 3: one channel
-};
-
-vec4 texel(Map map, sampler2D image)
+vec2 image_place(int k)
 {
-    vec2 st = map.uv == 0 ? uv01.xy : map.uv == 1 ? uv01.zw : map.uv == 2 ? uv23.xy : uv23.zw;
-    vec3 s = vec3(st, 1.0);
-    vec4 value = texture(image, vec2(dot(map.u, s), dot(map.v, s))) * map.scale + map.bias;
-    return map.channel < 0 ? value : vec4(value[map.channel]);
+    int set = uv_sets[k];
+    vec3 st = vec3(set == 0 ? uv01.xy : set == 1 ? uv01.zw : set == 2 ? uv23.xy : uv23.zw, 1.0);
+    return vec2(dot(image_u[k], st), dot(image_v[k], st));
+}
+
+#define texel(k) texture(images[k], image_place(k))  // k must be a constant
+#endif
+
+// -- fields of the material -----------------------------------------------------------------
+uniform vec3 diffuse, diffuse_scale;      // reflectance
+uniform vec3 specular, specular_scale;    // reflectance at normal incidence
+uniform vec3 emission, emission_scale;    // cd/m2
+uniform float metallic, metallic_scale;
+uniform float opacity, opacity_scale;
+uniform float opacity_threshold;
+uniform float occlusion, occlusion_scale;
+#ifdef GGX
+uniform float roughness, roughness_scale;
+#else
+uniform float shininess;
+#endif
+#ifdef EXTRA
+uniform float clearcoat, clearcoat_scale;
+uniform float clearcoat_roughness, clearcoat_roughness_scale;
+uniform float links;           // bits of the draw's light links
+#endif
+uniform float back_sign;       // of a back face's normal: -1 double-sided, 1 single-sided
+#ifdef SKY
+uniform vec3 sky[18];          // coefficients of ambient_lux
+#else
+uniform vec3 ambient;          // lux
+#endif
+uniform float lambert_scale;   // 1/pi, or 1 for petit2010
+
+layout(location = 0) out vec4 g_normal;    // unit normal; distance along the view axis, m
+layout(location = 1) out vec4 g_diffuse;   // reflectance; shininess, or minus alpha of GGX
+layout(location = 2) out vec4 g_specular;  // reflectance at normal incidence; metallic
+layout(location = 3) out vec4 hdr;         // cd/m2; 1, or as composite.frag wants it
+#ifdef EXTRA
+layout(location = 4) out vec4 g_extra;     // clear coat: weight, alpha; light links; 0
+#endif
+
+#ifdef PEEL
+uniform sampler2D opaque;      // g_normal of what is not blended
+uniform sampler2D before;      // g_normal of the layer in front of this one
+uniform vec2 pixel;            // 1 / size of both
+#endif
+
+#ifdef NORMAL_MAP
+in vec3 position;              // m, relative to the eye
+uniform vec3 bump, bump_scale;
+
+// A normal in tangent space, by how the texture's coordinates grow over the screen: +x along
+// the growth of u, +y to the side to which v grows, so that mirrored coordinates are right.
+vec3 bumped(vec3 n, vec3 tangent_space, vec2 place)
+{
+    vec3 px = dFdx(position), py = dFdy(position);
+    vec2 tx = dFdx(place), ty = dFdy(place);
+    float turn = sign(tx.x * ty.y - ty.x * tx.y);  // 0: coordinates that do not span a plane
+    vec3 u = turn * (px * ty.y - py * tx.y);
+    vec3 v = turn * (py * tx.x - px * ty.x);
+    u -= n * dot(n, u);
+    u *= inversesqrt(max(dot(u, u), 1e-30));
+    vec3 w = cross(n, u);
+    w *= dot(w, v) < 0.0 ? -1.0 : 1.0;
+    vec3 sum = u * tangent_space.x + w * tangent_space.y + n * tangent_space.z;
+    float length2 = dot(sum, sum);
+    return turn != 0.0 && length2 > 0.0 ? sum * inversesqrt(length2) : n;
 }
 #endif
 
-uniform vec3 diffuse;      // reflectance
-uniform vec3 specular;     // reflectance of the Blinn-Phong lobe
-uniform float shininess;
-uniform float metallic;
-uniform vec3 emission;     // cd/m2
-uniform float opacity;
-uniform float opacity_threshold;
-uniform float back_sign;   // of a back face's normal: -1 double-sided, 1 single-sided
-uniform vec3 ambient;      // lux
-uniform float lambert_scale;
-#ifdef DIFFUSE_MAP
-uniform Map diffuse_map;
-uniform sampler2D diffuse_image;
-#endif
-#ifdef EMISSION_MAP
-uniform Map emission_map;
-uniform sampler2D emission_image;
-#endif
-#ifdef OPACITY_MAP
-uniform Map opacity_map;
-uniform sampler2D opacity_image;
-#endif
-
-layout(location = 0) out vec4 g_normal;    // unit normal; distance along the view axis, m
-layout(location = 1) out vec4 g_diffuse;   // reflectance; shininess
-layout(location = 2) out vec4 g_specular;  // reflectance; opacity
-layout(location = 3) out vec4 hdr;         // cd/m2; 1
-
 void main()
 {
-    float alpha = opacity;
-#ifdef OPACITY_MAP
-    alpha = texel(opacity_map, opacity_image).r;
-#endif
-    if (alpha < opacity_threshold)
-        discard;
-    vec3 base = diffuse;
-#ifdef DIFFUSE_MAP
-    base = texel(diffuse_map, diffuse_image).rgb;
-#endif
+    vec3 base = diffuse DIFFUSE_MAP;
 #ifdef VERTEX_COLOR
     base *= color;
 #endif
-    vec3 glow = emission;
-#ifdef EMISSION_MAP
-    glow = texel(emission_map, emission_image).rgb;
+    float metal = clamp(metallic METALLIC_MAP, 0.0, 1.0);
+    vec3 n = normalize(normal);
+#ifdef NORMAL_MAP
+    n = bumped(n, bump NORMAL_MAP, image_place(NORMAL_PLACE));
 #endif
-    vec3 n = normalize(normal) * (gl_FrontFacing ? 1.0 : back_sign);
-    vec3 rho = base * (1.0 - metallic);
-    vec3 ks = mix(specular, base, metallic);
-    g_normal = vec4(n, depth);
-    g_diffuse = vec4(rho, shininess);
-    g_specular = vec4(ks, alpha);
+    n *= gl_FrontFacing ? 1.0 : back_sign;
     // What comes from everywhere alike is mirrored by a metal as a diffuse surface scatters it.
-    hdr = vec4(max(glow, 0.0) + lambert(base, ambient, lambert_scale), 1.0);
+#ifdef SKY
+    vec3 lux = ambient_lux(n, sky);
+#else
+    vec3 lux = ambient;
+#endif
+    lux *= clamp(occlusion OCCLUSION_MAP, 0.0, 1.0);
+    vec3 glow = max(emission EMISSION_MAP, 0.0) + lambert(base, lux, lambert_scale);
+    vec3 rho = base * (1.0 - metal);
+#ifdef GGX
+    float rough = clamp(roughness ROUGHNESS_MAP, 0.0, 1.0);
+    float gloss = -max(rough * rough, 1e-3);
+#else
+    float gloss = shininess;
+#endif
+    float shown = 1.0;
+#if defined(MASKED) || defined(BLEND)
+    float alpha = clamp(opacity OPACITY_MAP, 0.0, 1.0);
+#endif
+#ifdef MASKED
+    if (alpha < opacity_threshold)
+        discard;
+#endif
+#ifdef BLEND
+#ifdef PRESENCE
+    shown = -alpha;            // all of it, highlights too: multiplied when the layer is complete
+    if (alpha == 0.0)
+        discard;
+#else
+    shown = alpha;             // a highlight is as bright on clear glass
+    rho *= alpha;
+    glow *= alpha;
+#endif
+#endif
+#ifdef PEEL
+    float wall = textureLod(opaque, gl_FragCoord.xy * pixel, 0.0).w;
+    // What is painted on a wall lies in it, but for the rounding of both distances.
+    if (depth <= textureLod(before, gl_FragCoord.xy * pixel, 0.0).w
+        || (wall != 0.0 && depth > wall * (1.0 + 4e-6)))
+        discard;
+#endif
+    g_normal = vec4(n, depth);
+    g_diffuse = vec4(rho, gloss);
+    g_specular = vec4(mix(specular SPECULAR_MAP, base, metal), metal);
+    hdr = vec4(glow, shown);
+#ifdef EXTRA
+    float smooth_coat = clamp(clearcoat_roughness CLEARCOAT_ROUGHNESS_MAP, 0.0, 1.0);
+    g_extra = vec4(clamp(clearcoat CLEARCOAT_MAP, 0.0, 1.0),
+                   max(smooth_coat * smooth_coat, 1e-3), links, 0.0);
+#endif
 }

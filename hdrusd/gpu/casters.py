@@ -1,0 +1,382 @@
+"""The geometry that casts shadows, as few buffers and boxes to look for it in.
+
+What stands still and stands once is merged into one buffer of world positions, cut into
+chunks of neighbouring triangles; what moves or is drawn many times keeps its own buffer and
+its matrices. A call draws a chunk into all tiles that see it.
+
+Nothing is cast by what a Draw or a shadow link excludes, by what emits (the lens of a lamp
+stands before it), and by what blends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from hdrusd.gpu.buffers import weld
+from hdrusd.gpu.program import Programs
+from hdrusd.gpu.textures import TextureCache
+from hdrusd.scene import Draw, Geometry, Material, RenderScene, TextureUse
+
+Doubles = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.float32]
+Booleans = npt.NDArray[np.bool_]
+
+#: Triangles of a chunk of merged geometry.
+CHUNK = 1024
+
+#: Corners of all copies of a geometry up to which they are merged.
+_MERGED = 200_000
+
+#: m; a caster farther out than this is broken.
+_FARTHEST = 1e9
+
+#: Frames for which a buffer that nothing draws is kept.
+_KEEP = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Cutout:
+    """A surface with holes: opacity = scale * texel[channel] + bias, a hole below threshold."""
+
+    use: TextureUse
+    texture: moderngl.Texture
+    channel: int
+    scale: float
+    bias: float
+    threshold: float
+
+
+class _Nothing:
+    """In place of holes: all of it lets light through."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Caster:
+    draw: Draw
+    cutout: Cutout | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """One draw call: part of a buffer, once for each of ``matrices`` or ``tiles``."""
+
+    vao: moderngl.VertexArray
+    first: int
+    count: int
+    tiles: npt.NDArray[np.intp]  # (n,)
+    matrices: Doubles | None  # (n, 4, 4) into the clip space of each; None: the tile's own
+    cutout: Cutout | None
+
+
+@dataclass(slots=True, eq=False)
+class _Mesh:
+    """The buffer of one geometry."""
+
+    geometry: Geometry
+    vao: moderngl.VertexArray
+    buffers: tuple[moderngl.Buffer, ...]
+    count: int
+    box: Doubles  # (2, 3) middle and half size in its own space
+    used: int
+
+    def release(self) -> None:
+        self.vao.release()
+        for buffer in self.buffers:
+            buffer.release()
+
+
+@dataclass(slots=True, eq=False)
+class Group:
+    """Casters in one buffer, each with a box; ``transforms`` None: merged chunks.
+
+    ``links``: the shadow links that name it.
+    """
+
+    links: frozenset[int]
+    cutout: Cutout | None
+    vao: moderngl.VertexArray
+    boxes: Doubles  # (b, 2, 3) middle and half size, m from the origin
+    starts: npt.NDArray[np.intp]  # (b + 1,) first index of each chunk, merged ones
+    transforms: Doubles | None = None  # (b, 4, 4) to m from the origin
+    owned: tuple[moderngl.Buffer, ...] = ()
+    mesh: _Mesh | None = None
+
+    def runs(self, seen: Booleans, matrices: Doubles) -> Iterator[Run]:
+        """Draw calls where ``seen`` (t, b): a tile of ``matrices`` (t, 4, 4) sees a box."""
+        if self.transforms is not None:
+            tiles, which = np.nonzero(seen)
+            if len(tiles):
+                own = self.transforms[which] @ matrices[tiles]
+                yield Run(self.vao, 0, int(self.starts[-1]), tiles, own, self.cutout)
+            return
+        # Neighbouring chunks that the same tiles see are one call.
+        change = np.flatnonzero(np.any(seen[:, 1:] != seen[:, :-1], axis=0)) + 1
+        ends = [*change, seen.shape[1]]
+        for first, end in zip([0, *change], ends, strict=True):
+            tiles = np.flatnonzero(seen[:, first])
+            if len(tiles):
+                start, stop = int(self.starts[first]), int(self.starts[end])
+                yield Run(self.vao, start, stop - start, tiles, None, self.cutout)
+
+    def release(self) -> None:
+        if self.owned:
+            self.vao.release()
+            for buffer in self.owned:
+                buffer.release()
+
+
+class Casters:
+    """The casters of the current moment; keeps what was uploaded."""
+
+    def __init__(self, ctx: moderngl.Context, programs: Programs, textures: TextureCache) -> None:
+        self.ctx = ctx
+        self.programs = programs
+        self.textures = textures
+        self.origin: Doubles = np.zeros(3)
+        self.still: list[Group] = []
+        self.moving: list[Group] = []
+        self._links: tuple[int, ...] = ()
+        self._known: list[_Caster] | None = None
+        self._meshes: dict[tuple[str, Cutout | None], _Mesh] = {}
+        self._frame = 0
+
+    def update(self, scene: RenderScene) -> bool:
+        """Take a moment's casters; True where what stands still is not what it was."""
+        self._frame += 1
+        links = tuple(int(n) for n in np.unique(scene.lights["shadow_link"]) if n > 0)
+        holes = [self._holes(material) for material in scene.materials]
+        cast = [
+            _Caster(draw, hole)
+            for draw in scene.draws
+            if draw.casts and not isinstance(hole := holes[draw.material], _Nothing)
+            if len(draw.geometry.points) > 0 and len(draw.transforms) > 0
+        ]
+        still = [caster for caster in cast if not caster.draw.moving]
+        moving = [caster for caster in cast if caster.draw.moving]
+        changed = self._known is None or links != self._links or not _same(self._known, still)
+        self._links = links
+        if changed:
+            for group in self.still:
+                group.release()
+            self._known = still
+            self.origin = _origin(still or moving)
+            self.still = self._still(still)
+        self.moving = [self._placed(caster) for caster in moving]
+        for group in self.still:
+            if group.mesh is not None:
+                group.mesh.used = self._frame
+        for key in [k for k, mesh in self._meshes.items() if mesh.used < self._frame - _KEEP]:
+            self._meshes.pop(key).release()
+        return changed
+
+    def bounds(self, *, moving: bool = True) -> Doubles:
+        """(2, 3) lowest and highest corner of all casters, m from the origin; zeros for none."""
+        groups = [*self.still, *(self.moving if moving else [])]
+        boxes = [g.boxes for g in groups if len(g.boxes)]
+        if not boxes:
+            return np.zeros((2, 3))
+        middle, half = np.concatenate(boxes).transpose(1, 0, 2)
+        return np.array([np.min(middle - half, axis=0), np.max(middle + half, axis=0)])
+
+    def _holes(self, material: Material) -> Cutout | _Nothing | None:
+        """What of a material lets light through; None: nothing."""
+        emits = any(material.emission) or material.emission_map is not None
+        if emits or material.blend:
+            return _Nothing()
+        use, threshold = material.opacity_map, material.opacity_threshold
+        if use is None:
+            return None if material.opacity >= threshold else _Nothing()
+        if threshold <= 0.0:
+            return None
+        channel = max(use.channel, 0)
+        scale, bias = float(use.scale[channel]), float(use.bias[channel])
+        uploaded = self.textures.get(use.texture)
+        if uploaded is None:
+            return None if use.fallback[channel] * scale + bias >= threshold else _Nothing()
+        return Cutout(use, uploaded.texture, channel, scale, bias, threshold)
+
+    def _linked(self, draw: Draw) -> frozenset[int]:
+        return frozenset(n for n in self._links if draw.links >> (n - 1) & 1)
+
+    def _still(self, casters: Sequence[_Caster]) -> list[Group]:
+        """Merged geometry by what shadow links and holes it has; and what is drawn often."""
+        groups: list[Group] = []
+        merged: dict[tuple[frozenset[int], Cutout | None], list[_Caster]] = {}
+        for caster in casters:
+            draw = caster.draw
+            copies = len(draw.transforms)
+            if copies > 1 and copies * len(draw.geometry.points) > _MERGED:
+                groups.append(self._placed(caster))
+            else:
+                key = self._linked(draw), caster.cutout
+                merged.setdefault(key, []).append(caster)
+        found = [self._merged(*key, members) for key, members in merged.items()]
+        return groups + [group for group in found if group is not None]
+
+    def _merged(
+        self, links: frozenset[int], cutout: Cutout | None, members: Sequence[_Caster]
+    ) -> Group | None:
+        corners = []
+        for member in members:
+            draw = member.draw
+            points = draw.geometry.points.astype(np.float64)
+            moved = points @ draw.transforms[:, :3, :3]
+            moved += draw.transforms[:, None, 3, :3] - self.origin
+            flat = moved.reshape(-1, 3)
+            if cutout is not None:
+                uv = np.tile(self._uvs(draw.geometry, cutout), (len(moved), 1))
+                flat = np.concatenate([flat, uv], axis=1)
+            corners.append(_sound(flat))
+        triangles = np.concatenate(corners).reshape(-1, 3, 3 if cutout is None else 5)
+        if len(triangles) == 0:
+            return None
+        triangles = triangles[_neighbours(triangles[..., :3])]
+        starts = np.arange(0, len(triangles), CHUNK)
+        low = np.minimum.reduceat(triangles[..., :3].min(axis=1), starts).astype(np.float64)
+        high = np.maximum.reduceat(triangles[..., :3].max(axis=1), starts).astype(np.float64)
+        vertices, indices = weld(np.ascontiguousarray(triangles.reshape(-1, triangles.shape[2])))
+        vao, buffers = self._buffers(vertices, indices, cutout is not None)
+        return Group(
+            links=links,
+            cutout=cutout,
+            vao=vao,
+            boxes=np.stack([(low + high) / 2.0, (high - low) / 2.0], axis=1),
+            starts=3 * np.append(starts, len(triangles)),
+            owned=buffers,
+        )
+
+    def _placed(self, caster: _Caster) -> Group:
+        """A draw with its own buffer; one box for each of its places."""
+        draw, cutout = caster.draw, caster.cutout
+        mesh = self._mesh(draw.geometry, cutout)
+        places = draw.transforms.copy()
+        places[:, 3, :3] -= self.origin
+        good = np.isfinite(places).all(axis=(1, 2)) & (np.abs(places).max(axis=(1, 2)) < _FARTHEST)
+        places = places[good]
+        middle = mesh.box[0] @ places[:, :3, :3] + places[:, 3, :3]
+        half = mesh.box[1] @ np.abs(places[:, :3, :3])
+        return Group(
+            links=self._linked(draw),
+            cutout=cutout,
+            vao=mesh.vao,
+            boxes=np.stack([middle, half], axis=1),
+            starts=np.array([0, mesh.count]),
+            transforms=places,
+            mesh=mesh,
+        )
+
+    def _mesh(self, geometry: Geometry, cutout: Cutout | None) -> _Mesh:
+        key = geometry.key, cutout
+        kept = self._meshes.get(key)
+        if kept is not None and kept.geometry is geometry:
+            kept.used = self._frame
+            return kept
+        points = geometry.points
+        if cutout is not None:
+            points = np.concatenate([points, self._uvs(geometry, cutout)], axis=1)
+        corners = _sound(points.astype(np.float64))
+        # What changes from frame to frame is not worth the time that finding equal corners takes.
+        if kept is None:
+            vertices, indices = weld(corners)
+        else:
+            vertices, indices = corners, np.arange(len(corners), dtype=np.uint32)
+            kept.release()
+        vao, buffers = self._buffers(vertices, indices, cutout is not None)
+        places = corners[:, :3] if len(corners) else np.zeros((1, 3), np.float32)
+        low, high = places.min(axis=0), places.max(axis=0)
+        box = np.array([low + high, high - low], np.float64) / 2.0
+        self._meshes[key] = _Mesh(geometry, vao, buffers, len(indices), box, self._frame)
+        return self._meshes[key]
+
+    def _uvs(self, geometry: Geometry, cutout: Cutout) -> Floats:
+        """(3 t, 2) coordinates in the texture of the opacity."""
+        use = cutout.use
+        uploaded = self.textures.get(use.texture)
+        assert uploaded is not None
+        st = geometry.uvs.get(use.uv_set)
+        if st is None:
+            st = np.zeros((len(geometry.points), 2), np.float32)
+        matrix = np.reshape(use.matrix, (2, 3))
+        uv = st @ matrix[:, :2].T + matrix[:, 2]
+        return np.asarray(uv * uploaded.scale + uploaded.offset, np.float32)
+
+    def _buffers(
+        self, vertices: Floats, indices: npt.NDArray[np.uint32], textured: bool
+    ) -> tuple[moderngl.VertexArray, tuple[moderngl.Buffer, ...]]:
+        defines = {"CUTOUT": 1} if textured else None
+        program = self.programs.get("gpu/shaders/shadow.vert", "gpu/shaders/shadow.frag", defines)
+        # An empty buffer is an error of OpenGL.
+        buffers = tuple(
+            self.ctx.buffer(data) if len(data) else self.ctx.buffer(reserve=20)
+            for data in (vertices, indices)
+        )
+        names = ("3f 2f", "in_position", "in_uv") if textured else ("3f", "in_position")
+        return self.ctx.vertex_array(program, [(buffers[0], *names)], buffers[1]), buffers
+
+
+def frustum_sees(matrices: Doubles, boxes: Doubles) -> Booleans:
+    """(t, b): whether box b (middle, half size) may reach into the clip space of tile t.
+
+    ``matrices`` (t, 4, 4) row-vector; a box that straddles two planes outside may pass.
+    """
+    x, y, z, w = matrices.transpose(2, 0, 1)  # columns: each (t, 4), coefficients of a plane
+    planes = np.stack([w + x, w - x, w + y, w - y, w + z], axis=1).reshape(-1, 4)
+    # A block of planes at a time: what it takes does not grow with the scene.
+    rows = max(5, 4_000_000 // max(len(boxes), 1) // 5 * 5)
+    seen = []
+    for first in range(0, len(planes), rows):
+        some = planes[first : first + rows]
+        reach = boxes[:, 0] @ some[:, :3].T + boxes[:, 1] @ np.abs(some[:, :3]).T + some[:, 3]
+        seen.append(np.all(reach.reshape(len(boxes), -1, 5) > 0.0, axis=2).T)
+    return np.concatenate(seen) if seen else np.zeros((0, len(boxes)), np.bool_)
+
+
+def _same(known: Sequence[_Caster], casters: Sequence[_Caster]) -> bool:
+    return len(known) == len(casters) and all(
+        a.draw.geometry is b.draw.geometry
+        and a.cutout == b.cutout
+        and a.draw.links == b.draw.links
+        and np.array_equal(a.draw.transforms, b.draw.transforms)
+        for a, b in zip(known, casters, strict=True)
+    )
+
+
+def _origin(casters: Sequence[_Caster]) -> Doubles:
+    """(3,) the median place of the draws: one that stands far off does not move it."""
+    places = [
+        np.array([*d.geometry.points[0].astype(np.float64), 1.0]) @ d.transforms[:, :, :3]
+        for d in (caster.draw for caster in casters)
+    ]
+    all_places = np.concatenate(places) if places else np.zeros((0, 3))
+    all_places = all_places[np.isfinite(all_places).all(axis=1)]
+    return np.round(np.median(all_places, axis=0)) if len(all_places) else np.zeros(3)
+
+
+def _sound(corners: Doubles) -> Floats:
+    """The triangles whose corners are numbers of a reasonable size, as float32."""
+    triangles = corners.reshape(-1, 3 * corners.shape[1])
+    with np.errstate(invalid="ignore"):
+        good = np.all(np.abs(triangles) < _FARTHEST, axis=1)
+    return np.ascontiguousarray(triangles[good].reshape(-1, corners.shape[1]), np.float32)
+
+
+def _neighbours(triangles: Floats) -> npt.NDArray[np.intp]:
+    """(t,) an order in which those of like size and place follow one another."""
+    low, high = triangles.min(axis=1), triangles.max(axis=1)
+    least, most = low.min(axis=0), high.max(axis=0)
+    extent = max(float(np.max(most - least)), 1e-9)
+    size = np.maximum(np.max(high - low, axis=1) / extent, 1e-9)
+    octave = np.clip(-np.log2(size) / 2.0, 0, 5).astype(np.uint64)
+    cell = np.clip(((low + high) / 2.0 - least) / extent * 1023.0, 0, 1023).astype(np.uint64)
+    key = octave << np.uint64(32)
+    for axis in range(3):
+        bits = cell[:, axis]
+        for shift, mask in ((16, 0x30000FF), (8, 0x300F00F), (4, 0x30C30C3), (2, 0x9249249)):
+            bits = (bits | (bits << np.uint64(shift))) & np.uint64(mask)
+        key |= bits << np.uint64(axis)
+    return np.argsort(key, kind="stable")

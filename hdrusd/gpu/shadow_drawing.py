@@ -1,0 +1,265 @@
+"""Casters drawn into the tiles of the shadow atlas.
+
+An instance of a draw call is a tile, so that their number does not multiply the number of
+calls: matrices come from a texture, and clip distances keep each tile to itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from hdrusd.gpu.casters import Group, Run, frustum_sees
+from hdrusd.gpu.program import Programs
+from hdrusd.gpu.surfaces import set_used
+
+Doubles = npt.NDArray[np.float64]
+Booleans = npt.NDArray[np.bool_]
+
+#: Tiles drawn together: bounds the memory that their matrices take.
+_TOGETHER = 256
+
+#: Instances drawn together, or one tile's: the rest of what bounds it.
+_PAIRS = 250_000
+
+#: Texels of a tile's row in the table (shadow.vert), and width of that table.
+_ROW = 6
+_TABLE = 4096
+
+#: GL_CLIP_DISTANCE0 to 4, which moderngl has no names for.
+_CLIP_DISTANCES = range(0x3000, 0x3005)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tiles:
+    """Tiles, one a row: squares of the atlas and what is seen through them."""
+
+    matrices: Doubles  # (t, 4, 4) row-vector, from the casters' origin to clip space
+    balls: Doubles  # (t, 4) the tile's eye from the lamp in its frame; lamp's radius squared
+    tangents: Doubles  # (t,)
+    squares: Doubles  # (t, 3) left, bottom, side in texels
+    links: npt.NDArray[np.int64]  # (t,) the shadow link of its light, 0 for everything
+
+    def __len__(self) -> int:
+        return len(self.links)
+
+    def __getitem__(self, which: Any) -> Tiles:
+        return Tiles(
+            self.matrices[which],
+            self.balls[which],
+            self.tangents[which],
+            self.squares[which],
+            self.links[which],
+        )
+
+    def table(self, size: tuple[int, int]) -> Doubles:
+        """(t, 6, 4) rows of the table that shadow.vert reads."""
+        rows = np.empty((len(self), _ROW, 4))
+        rows[:, :4] = self.matrices.swapaxes(1, 2)
+        half = self.squares[:, 2:] / 2.0
+        rows[:, 4, :2] = (self.squares[:, :2] + half) * (2.0 / np.asarray(size)) - 1.0
+        rows[:, 4, 2:] = np.concatenate([half * (2.0 / size[0]), self.tangents[:, None]], axis=1)
+        rows[:, 5] = self.balls
+        return rows
+
+
+def join(parts: Sequence[Tiles]) -> Tiles:
+    """The tiles of all, in order."""
+    names = ("matrices", "balls", "tangents", "squares", "links")
+    return Tiles(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+def seen_by(tiles: Tiles, group: Group) -> Booleans:
+    """(t, b): whether a tile sees a box of the group, and its light's link lets it cast."""
+    allowed = np.array([link == 0 or link in group.links for link in tiles.links.tolist()])
+    seen = np.zeros((len(tiles), len(group.boxes)), np.bool_)
+    if allowed.any() and len(group.boxes):
+        seen[allowed] = frustum_sees(tiles.matrices[allowed], group.boxes)
+    return seen
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Target:
+    texture: moderngl.Texture
+    framebuffer: moderngl.Framebuffer
+
+    def release(self) -> None:
+        self.framebuffer.release()
+        self.texture.release()
+
+
+class TileDrawing:
+    """The atlas on the GPU: what is shown and, where something moves, what stands still."""
+
+    def __init__(self, ctx: moderngl.Context, programs: Programs) -> None:
+        self.ctx = ctx
+        self.programs = programs
+        self.size = (0, 0)
+        self._shown: _Target | None = None
+        self._still: _Target | None = None
+        self._blank: _Target | None = None
+        self._squares: dict[moderngl.Program, moderngl.VertexArray] = {}
+
+    @property
+    def twice(self) -> bool:
+        """Whether what stands still is kept apart."""
+        return self._still is not None
+
+    def use(self, unit: int) -> None:
+        """Bind the atlas; one lit texel where there is none."""
+        target = self._shown
+        if target is None:
+            if self._blank is None:
+                self._blank = self._target((1, 1))
+                self._blank.framebuffer.clear(depth=1.0)
+            target = self._blank
+        target.texture.use(unit)
+
+    def resize(self, size: tuple[int, int], *, moving: bool) -> bool:
+        """Make room; True where what was drawn is lost."""
+        if size == self.size and (self._still is not None or not moving):
+            return False
+        for old in (self._shown, self._still):
+            if old is not None:
+                old.release()
+        self.size = size
+        self._shown = self._target(size)
+        self._still = self._target(size) if moving else None
+        if self._still is not None:
+            self._still.texture.compare_func = ""
+        return True
+
+    def draw_still(self, tiles: Tiles, groups: Sequence[Group]) -> None:
+        """Tiles anew, with what stands still."""
+        self._draw(self._still or self._shown, tiles, groups, "TILES")
+
+    def draw_moving(self, tiles: Tiles, groups: Sequence[Group]) -> None:
+        """Tiles as they are without what moves, and that."""
+        if self._still is not None:
+            self._draw(self._shown, tiles, groups, "RESTORE")
+
+    def _target(self, size: tuple[int, int]) -> _Target:
+        texture = self.ctx.depth_texture(size)
+        texture.compare_func = "<="
+        texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        texture.repeat_x = texture.repeat_y = False
+        return _Target(texture, self.ctx.framebuffer(depth_attachment=texture))
+
+    def _draw(
+        self,
+        target: _Target | None,
+        tiles: Tiles,
+        groups: Sequence[Group],
+        start: str,
+    ) -> None:
+        if target is None or len(tiles) == 0:
+            return
+        ctx = self.ctx
+        target.framebuffer.use()
+        ctx.enable_only(moderngl.DEPTH_TEST)
+        boxes = max(sum(len(group.boxes) for group in groups), 1)
+        together = min(max(_PAIRS // boxes, 1), _TOGETHER)
+        for first in range(0, len(tiles), together):
+            some = tiles[first : first + together]
+            table = _Table(some.table(self.size))
+            calls = [
+                (run, table.add(run))
+                for group in groups
+                for run in group.runs(seen_by(some, group), some.matrices)
+            ]
+            textures = table.upload(ctx)
+            self._start(len(some), start)
+            for distance in _CLIP_DISTANCES:
+                ctx.enable_direct(distance)
+            ctx.depth_func = "<"
+            for run, at in calls:
+                self._call(run, at)
+            for distance in _CLIP_DISTANCES:
+                ctx.disable_direct(distance)
+            for texture in textures:
+                texture.release()
+        # A bound framebuffer must not be the one that ``resize`` releases.
+        ctx.extra["framebuffer"].use()
+
+    def _start(self, count: int, start: str) -> None:
+        """Each tile filled: with the far plane, or with what stands still."""
+        program = self.programs.get(
+            "gpu/shaders/shadow.vert",
+            "gpu/shaders/shadow.frag",
+            {"TILES": 1} | ({"RESTORE": 1} if start == "RESTORE" else {}),
+        )
+        self._uniforms(program, 0)
+        set_used(program, "fill", 1.0)
+        if start == "RESTORE":
+            assert self._still is not None
+            self._still.texture.use(2)
+            set_used(program, "kept", 2)
+        if program not in self._squares:
+            self._squares[program] = self.ctx.vertex_array(program, [])
+        self.ctx.depth_func = "1"
+        self._squares[program].render(moderngl.TRIANGLE_STRIP, vertices=4, instances=count)
+
+    def _call(self, run: Run, first: int) -> None:
+        cutout = run.cutout
+        program = run.vao.program
+        self._uniforms(program, first)
+        if cutout is not None:
+            cutout.texture.use(2)
+            set_used(program, "opacity_image", 2)
+            for name in ("channel", "scale", "bias", "threshold"):
+                set_used(program, name, getattr(cutout, name))
+        run.vao.render(
+            moderngl.TRIANGLES, vertices=run.count, first=run.first, instances=len(run.tiles)
+        )
+
+    def _uniforms(self, program: moderngl.Program, first: int) -> None:
+        aspect = self.size[0] / self.size[1]
+        for name, value in (("tiles", 0), ("pairs", 1), ("first", first), ("aspect", aspect)):
+            set_used(program, name, value)
+
+
+class _Table:
+    """Rows for shadow.vert and which of them each instance reads."""
+
+    def __init__(self, tiles: Doubles) -> None:
+        self._tiles = tiles
+        self._rows = [tiles]
+        self._pairs: list[npt.NDArray[np.intp]] = [np.arange(len(tiles))]
+        self._row_count = self._pair_count = len(tiles)
+
+    def add(self, run: Run) -> int:
+        """Where the instances of a call begin."""
+        first = self._pair_count
+        pairs = run.tiles
+        if run.matrices is not None:
+            rows = self._tiles[run.tiles]
+            rows[:, :4] = run.matrices.swapaxes(1, 2)
+            self._rows.append(rows)
+            pairs = np.arange(self._row_count, self._row_count + len(rows))
+            self._row_count += len(rows)
+        self._pairs.append(pairs)
+        self._pair_count += len(pairs)
+        return first
+
+    def upload(self, ctx: moderngl.Context) -> tuple[moderngl.Texture, moderngl.Texture]:
+        """Textures of both, on units 0 and 1."""
+        rows = np.concatenate(self._rows).reshape(-1, 4).astype(np.float32)
+        pairs = np.concatenate(self._pairs).astype(np.int32)[:, None]
+        textures = _texels(ctx, rows, "f4"), _texels(ctx, pairs, "i4")
+        for unit, texture in enumerate(textures):
+            texture.use(unit)
+        return textures
+
+
+def _texels(ctx: moderngl.Context, data: npt.NDArray[Any], dtype: str) -> moderngl.Texture:
+    height = -(-len(data) // _TABLE)
+    padded = np.zeros((height * _TABLE, data.shape[1]), data.dtype)
+    padded[: len(data)] = data
+    texture = ctx.texture((_TABLE, height), data.shape[1], padded, dtype=dtype)
+    texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+    return texture

@@ -1,0 +1,279 @@
+"""Sky light past what stands in its way: ``SkyOcclusion``, for rooms and streets by day.
+
+The sky is seen from a number of directions that share the sphere evenly. From each of
+them the casters are drawn from outside of everything into a tile of a depth texture,
+without perspective, and every pixel of the picture looks up whether that direction
+reaches it. The lux under open sky times the share that arrives is the result, so that
+where nothing stands in the way it is what it is without this.
+
+Error: the share of the sky that is seen through an opening is counted in whole
+directions; through one that fills 5 % of a surface's sky 4096 directions are good to
+1 to 2 %. A tile is spread over all surfaces in the picture: what is smaller than its
+texels (the finding "sky-occlusion" has their size) does not shade.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from hdrusd.errors import SourceRef
+from hdrusd.gpu.casters import Casters
+from hdrusd.gpu.lights import window_uniforms
+from hdrusd.gpu.program import Programs
+from hdrusd.gpu.shadow_drawing import TileDrawing, Tiles
+from hdrusd.gpu.sky import SkyPass
+from hdrusd.gpu.surfaces import set_used
+from hdrusd.gpu.textures import TextureCache
+from hdrusd.report import Kind, Report
+from hdrusd.scene import RenderScene
+
+Doubles = npt.NDArray[np.float64]
+
+#: Directions that one pass over the picture looks up: 16 floats each of the 1024 uniforms that
+#: OpenGL 3.3 grants.
+BATCH = 32
+
+#: Tiles drawn together: their side in texels, and how many stand side by side.
+TILE, _GRID = 256, (8, 4)
+
+#: Texels around what a tile is for.
+_BORDER = 2
+
+#: How far from the surfaces a caster may be, in half sizes of what is seen.
+_FARTHEST = 1000.0
+
+
+class SkyOcclusion:
+    """Adds the sky's diffuse light; surfaces must have been drawn without it."""
+
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        programs: Programs,
+        textures: TextureCache,
+        skies: SkyPass,
+        size: tuple[int, int],
+        scale: float,
+        samples: int,
+        report: Report,
+    ) -> None:
+        self.ctx = ctx
+        self.programs = programs
+        self.skies = skies
+        self.size = size
+        self.scale = scale
+        self.report = report
+        self.directions = even_directions(samples)
+        self._casters = Casters(ctx, programs, textures)
+        self._tiles = TileDrawing(ctx, programs)
+        self._arriving = ctx.texture(size, 4, dtype="f4")
+        self._arriving.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._sum = ctx.framebuffer([self._arriving])
+        self._vaos: dict[moderngl.Program, moderngl.VertexArray] = {}
+
+    def add(
+        self,
+        scene: RenderScene,
+        layers: Mapping[str, moderngl.Texture],
+        frame: moderngl.Framebuffer,
+    ) -> None:
+        """The sky's light on the surfaces of a G-buffer, into ``frame`` (blended).
+
+        ``layers``: the G-buffer by the names of its samplers.
+        """
+        box = self._surfaces(scene, layers["g_normal"])
+        luminance = self.skies.luminance(scene, self.directions)
+        bright = np.any(luminance > 0.0, axis=1)
+        if box is None or not bright.any():
+            return
+        self._casters.update(scene)
+        self._sum.use()
+        self._sum.clear()
+        self._look_up(scene, layers, box, self.directions[bright], luminance[bright])
+        self._finish(scene, layers, frame)
+
+    def _surfaces(self, scene: RenderScene, normals: moderngl.Texture) -> Doubles | None:
+        """(2, 3) lowest and highest corner of what is seen, m from the eye; None for nothing."""
+        width, height = self.size
+        found = np.frombuffer(normals.read(), np.float32).reshape(height, width, 4)
+        depth = found[..., 3].astype(np.float64)
+        if not (depth > 0.0).any():
+            return None
+        window = window_uniforms(scene.camera)
+        x = ((np.arange(width) + 0.5) / width)[None, :, None] * np.asarray(window["ray_x"])
+        y = ((np.arange(height) + 0.5) / height)[:, None, None] * np.asarray(window["ray_y"])
+        across = np.asarray(window["ray_origin"]) + x + y
+        if not window["orthographic"]:
+            across = across * depth[..., None]
+        points = across + depth[..., None] * np.asarray(window["forward"])
+        points = points[depth > 0.0]
+        return np.array([points.min(axis=0), points.max(axis=0)])
+
+    def _look_up(
+        self,
+        scene: RenderScene,
+        layers: Mapping[str, moderngl.Texture],
+        box: Doubles,
+        directions: Doubles,
+        luminance: Doubles,
+    ) -> None:
+        """The sums of sky_occlusion.frag over all directions."""
+        program = self.programs.get(
+            "gpu/shaders/sky.vert", "gpu/shaders/sky_occlusion.frag", {"BATCH": BATCH}
+        )
+        columns, rows = _GRID
+        size = columns * TILE, rows * TILE
+        self._tiles.resize(size, moving=False)
+        eye = np.asarray(scene.camera.eye) - self._casters.origin
+        views = Views(box + eye, self._casters.bounds(), directions)
+        self._say(views.texel)
+        groups = [*self._casters.still, *self._casters.moving]
+        number = np.arange(BATCH)
+        squares = TILE * np.column_stack([number % columns, number // columns, number * 0 + 1])
+        side = TILE / np.array(size)
+        for first in range(0, len(directions), BATCH):
+            chosen = slice(first, first + BATCH)
+            count = len(directions[chosen])
+            self._tiles.draw_still(views.tiles(chosen, squares[:count]), groups)
+            values = {
+                **views.uniforms(chosen, squares[:count, :2] / size, side, eye),
+                "luminance": np.append(luminance[chosen], views.scales(chosen), axis=1),
+            }
+            # A batch that is not full is filled with darkness.
+            full = {name: _filled(value) for name, value in values.items()}
+            self._sum.use()
+            self.ctx.enable_only(moderngl.BLEND)
+            self.ctx.blend_func = moderngl.ONE, moderngl.ONE
+            self._tiles.use(len(layers))
+            units = {"depths": len(layers), "texel": views.texel}
+            self._draw(program, scene, layers, units | full)
+        self.ctx.enable_only(moderngl.NOTHING)
+
+    def _finish(
+        self,
+        scene: RenderScene,
+        layers: Mapping[str, moderngl.Texture],
+        frame: moderngl.Framebuffer,
+    ) -> None:
+        defines = {"COATED": 1} if "g_extra" in layers else {}
+        program = self.programs.get("gpu/shaders/sky.vert", "gpu/shaders/sky_light.frag", defines)
+        self._arriving.use(len(layers))
+        frame.use()
+        frame.depth_mask = False
+        self.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
+        self.ctx.depth_func = ">"
+        self.ctx.blend_func = moderngl.ONE, moderngl.ONE
+        values = {
+            "arriving": len(layers),
+            "sky_lux": self.skies.lux_coefficients(scene),
+            "lambert_scale": self.scale,
+        }
+        self._draw(program, scene, layers, values)
+        frame.depth_mask = True
+        self.ctx.enable_only(moderngl.NOTHING)
+
+    def _draw(
+        self,
+        program: moderngl.Program,
+        scene: RenderScene,
+        layers: Mapping[str, moderngl.Texture],
+        values: Mapping[str, Any],
+    ) -> None:
+        for unit, (name, layer) in enumerate(layers.items()):
+            layer.use(unit)
+            set_used(program, name, unit)
+        for name, value in (dict(values) | window_uniforms(scene.camera)).items():
+            if isinstance(value, np.ndarray):
+                program[name].write(np.ascontiguousarray(value, np.float32))  # type: ignore[union-attr]
+            else:
+                set_used(program, name, value)
+        if program not in self._vaos:
+            self._vaos[program] = self.ctx.vertex_array(program, [])
+        self._vaos[program].render(moderngl.TRIANGLES, vertices=3)
+
+    def _say(self, texel: float) -> None:
+        text = f"sky light is shaded by what is larger than {texel:.2g} m"
+        self.report.add(Kind.ASSUMED, "sky-occlusion", SourceRef(Path()), "", text)
+
+
+class Views:
+    """Orthographic views against each of (n, 3) directions to the sky, onto a box of surfaces.
+
+    ``box``, ``casters`` (2, 3): lowest and highest corners, m from the casters' origin.
+    """
+
+    def __init__(self, box: Doubles, casters: Doubles, directions: Doubles) -> None:
+        middle = box.mean(axis=0)
+        # The same for all directions, so that a texel is as wide in all.
+        half = max(float(np.linalg.norm(box[1] - box[0])) / 2.0, 1e-3)
+        half *= TILE / (TILE - 2 * _BORDER)
+        self.texel = 2.0 * half / TILE
+        steep = np.abs(directions[:, 2:]) > 0.9
+        beside = np.cross(directions, np.where(steep, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]))
+        x = beside / np.linalg.norm(beside, axis=1, keepdims=True)
+        y = np.cross(directions, x)
+        # Nearest and farthest corner along each direction, of casters and surfaces.
+        corners = np.stack([box, casters])
+        ends = corners[:, None] * directions[None, :, None, :]
+        near, far = np.max(ends, axis=2).sum(axis=-1), np.min(ends, axis=2).sum(axis=-1)
+        # What lies beyond ``_FARTHEST`` would take the digits of the depth.
+        reach = directions @ middle
+        near = np.minimum(near.max(axis=0), reach + _FARTHEST * half) + self.texel
+        far = np.maximum(far.min(axis=0), reach - _FARTHEST * half) - self.texel
+        #: (n, 4) rows of the map to clip space: x, y, z of a place and 1.
+        self.x = np.column_stack([x, -x @ middle]) / half
+        self.y = np.column_stack([y, -y @ middle]) / half
+        scale = 2.0 / (near - far)
+        self.z = np.column_stack([-directions * scale[:, None], (near + far) / (near - far)])
+        self.directions = directions
+        self._scale = scale
+
+    def tiles(self, chosen: slice, squares: npt.NDArray[Any]) -> Tiles:
+        """What draws the casters of some of the views into squares (left, bottom, side)."""
+        count = len(self.directions[chosen])
+        matrices = np.zeros((count, 4, 4))
+        for column, row in enumerate((self.x, self.y, self.z)):
+            matrices[:, :, column] = row[chosen]
+        matrices[:, 3, 3] = 1.0
+        nowhere = np.tile([0.0, 0.0, 0.0, -1.0], (count, 1))  # a lamp without a body
+        return Tiles(matrices, nowhere, np.ones(count), squares, np.zeros(count, np.int64))
+
+    def scales(self, chosen: slice) -> Doubles:
+        """(k, 1) depth in the texture a metre."""
+        return self._scale[chosen, None] / 2.0
+
+    def uniforms(
+        self, chosen: slice, corners: Doubles, side: Doubles, eye: Doubles
+    ) -> dict[str, Doubles]:
+        """Of sky_occlusion.frag: from places relative to the eye to the texture, 0 to 1."""
+        at_eye = np.append(eye, 1.0)
+        found = {}
+        for axis, (name, row) in enumerate((("across", self.x), ("along", self.y))):
+            moved = row[chosen].copy()
+            moved[:, 3] = moved @ at_eye
+            moved *= side[axis] / 2.0
+            moved[:, 3] += corners[:, axis] + side[axis] / 2.0
+            found[name] = moved
+        depth = self.z[chosen] @ at_eye / 2.0 + 0.5
+        found["towards"] = np.column_stack([self.directions[chosen], depth])
+        return found
+
+
+def _filled(values: Doubles) -> Doubles:
+    return np.concatenate([values, np.zeros((BATCH - len(values), 4))])
+
+
+def even_directions(count: int) -> Doubles:
+    """(count, 3) unit vectors that share the sphere evenly: a Fibonacci lattice."""
+    k = np.arange(count) + 0.5
+    z = 1.0 - 2.0 * k / count
+    turn = math.pi * (1.0 + math.sqrt(5.0)) * k
+    level = np.sqrt(1.0 - z * z)
+    return np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=-1)

@@ -1,0 +1,197 @@
+"""What casts a shadow and what does not; what moves; what is drawn again and what is kept."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from shadow_scenes import MATERIALS, along, draw, edge, maps, move, plane, scene, seen, slab
+from small_scenes import quad
+
+from hdrusd.gpu.shadows import ShadowMaps
+from hdrusd.report import Report
+from hdrusd.scene import Camera, Material, RenderScene, TextureRef, TextureUse
+
+LAMP = {"position": (0.0, 0.0, 4.0), "intensity": 800.0, "radius": 0.05}
+FLOOR = draw(plane(6.0))
+ROOF = plane(0.5, 1.3, "roof")
+BELOW = [(0.1, 0.2, 0.0)]
+SUN = {"position": (0.0, 0.6, 0.8), "w": 0.0, "intensity": 100.0}
+
+
+class Spy:
+    """Counts the tiles that are drawn."""
+
+    def __init__(self, shadows: ShadowMaps, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.still = self.moving = 0
+        drawing = shadows._drawing
+        draws = {"still": drawing.draw_still, "moving": drawing.draw_moving}
+
+        def count(name: str) -> Any:
+            def counted(tiles: Any, groups: Any) -> None:
+                setattr(self, name, getattr(self, name) + len(tiles))
+                draws[name](tiles, groups)
+
+            return counted
+
+        monkeypatch.setattr(drawing, "draw_still", count("still"))
+        monkeypatch.setattr(drawing, "draw_moving", count("moving"))
+
+    def taken(self) -> tuple[int, int]:
+        counts = self.still, self.moving
+        self.still = self.moving = 0
+        return counts
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_what_casts(gl: Any, moving: bool) -> None:
+    def below(roof: Any) -> float:
+        shown = scene(LAMP, FLOOR, replace(roof, moving=moving))
+        return float(seen(gl, shown, BELOW)[0])
+
+    assert below(draw(ROOF)) == 0.0
+    assert below(draw(ROOF, casts=False)) == 1.0
+    assert below(draw(ROOF, 1)) == 1.0  # blends
+    assert below(draw(ROOF, 2)) == 1.0  # emits
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_shadow_links(gl: Any, moving: bool) -> None:
+    """The second lamp's shadows are of the second roof alone."""
+    first = draw(plane(0.3, 1.3, "first"), links=0b01, moving=moving)
+    second = draw(ROOF, 0, move(2, 0, 0), links=0b10, moving=moving)
+    lamps = [LAMP | {"shadow_link": link} for link in (0, 1, 2)]
+    shown = scene(lamps, FLOOR, first, second)
+    places = [(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)]
+    shares = [seen(gl, shown, places, light=i).tolist() for i in range(3)]
+    assert shares == [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]]
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_a_cutout_casts_with_its_holes(gl: Any, moving: bool) -> None:
+    """A square whose left half has an opacity of 0.2, below the threshold of 0.5."""
+    image = np.full((64, 64, 1), 255, np.uint8)
+    image[:, :32] = 51
+    use = TextureUse(TextureRef("holes.png", "linear", "clamp", "clamp"), channel=0)
+    material = Material(opacity_map=use, opacity_threshold=0.5)
+    roof = quad((-0.5, -0.5, 1.3), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), key="roof")
+    shown = scene(LAMP, FLOOR, draw(roof, 3, moving=moving), materials=(*MATERIALS, material))
+    shadows = maps(gl, images={"holes.png": image})
+    places = along((-0.7, 0.1, 0.0), (0.7, 0.1, 0.0), 1401)
+    share = seen(gl, shown, places, shadows=shadows)
+    # The seam at x = 0, where the filter of texels 1.6 cm wide (2.3 on the floor) passes 1/2.
+    assert abs(edge(places[:, 0], share)) < 0.024
+    assert share[0] == 1.0
+    assert share[-1] == 0.0
+    # Without its picture the fallback counts: (0, 0, 0, 1) in channel 0 is a hole.
+    assert np.all(seen(gl, shown, BELOW) == 1.0)
+
+
+def test_nothing_inside_the_lamp_casts(gl: Any) -> None:
+    """A lampshade of half side 0.1 around a lamp of radius 0.2 lets it shine; a larger one not."""
+    shade = slab((-0.1, -0.1, 3.9), (0.1, 0.1, 4.1))
+    small = scene(LAMP | {"radius": 0.2}, FLOOR, draw(shade))
+    assert np.all(seen(gl, small, BELOW) == 1.0)
+    assert np.all(seen(gl, scene(LAMP, FLOOR, draw(shade)), BELOW) == 0.0)
+    ball = scene(LAMP | {"radius": 0.2, "shape": 1}, FLOOR, draw(shade))
+    assert np.all(seen(gl, ball, BELOW) == 1.0)
+
+
+def test_many_copies_cast_each_its_shadow(gl: Any) -> None:
+    """Copies whose corners are too many to be merged: 40,000 of a box of 36 corners."""
+    x, y = (a.ravel() for a in np.meshgrid(np.arange(200), np.arange(200)))
+    places = np.tile(np.eye(4), (40_000, 1, 1))
+    places[:, 3, 0], places[:, 3, 1] = 0.2 * (x - 100), 0.2 * (y - 100)
+    box = slab((0.05, 0.05, 0.5), (0.15, 0.15, 0.51))
+    shown = scene(LAMP, FLOOR, draw(box, 0, *places))
+    # The shadow of the one beside the lamp's foot, and the gap there.
+    share = seen(gl, shown, [(0.1 * 4 / 3.49, 0.1 * 4 / 3.49, 0.0), (0.0, 0.0, 0.0)])
+    assert share.tolist() == [0.0, 1.0]
+
+
+@pytest.mark.parametrize("lamp", [LAMP, LAMP | {"inner": 0.7, "outer": 0.8}, SUN])
+def test_a_sequence_is_what_its_frames_are_alone(gl: Any, lamp: dict[str, Any]) -> None:
+    """A roof that moves under a moving lamp, comes, goes: no trace of the frames before."""
+    shadows = maps(gl)
+    places = np.concatenate([along((-3, y, 0), (3, y, 0), 61) for y in (-1.0, 0.1, 1.0)])
+    still = draw(plane(0.2, 2.0, "still"), 0, move(0.4, 0.5, 0))
+    for step in range(6):
+        roof = draw(ROOF, 0, move(0.5 * step - 1.0, 0.0, 0.0), moving=True)
+        draws = [FLOOR, still] if step == 4 else [FLOOR, still, roof]
+        where = lamp if step < 3 or "w" in lamp else lamp | {"position": (0.3, 0.0, 4.0)}
+        shown = scene(where, *draws)
+        together = seen(gl, shown, places, shadows=shadows)
+        assert np.array_equal(together, seen(gl, shown, places))
+        assert 0.0 < together.mean() < 1.0
+
+
+def test_deforming_geometry(gl: Any) -> None:
+    shadows = maps(gl)
+    for version, x in enumerate((0.0, 2.0, 0.0)):
+        roof = replace(plane(0.5, 1.3, "roof"), version=version)
+        roof.points[:, 0] += x
+        shown = scene(LAMP, FLOOR, draw(roof, moving=True))
+        assert seen(gl, shown, BELOW, shadows=shadows)[0] == (1.0 if x else 0.0)
+
+
+def test_what_stands_still_is_drawn_once(gl: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    shadows = maps(gl)
+    spy = Spy(shadows, monkeypatch)
+    lamps = [LAMP, LAMP | {"position": (2.0, 0.0, 4.0)}]
+    shadows.update(scene(lamps, FLOOR, draw(ROOF)))
+    assert spy.taken() == (10, 10)  # each lamp's lower faces: nothing is above it
+    # Another moment, another eye, lamps of another brightness: nothing is drawn.
+    brighter = [lamp | {"intensity": 900.0} for lamp in lamps]
+    shadows.update(scene(brighter, FLOOR, draw(ROOF), camera=Camera(eye=(0.1, -6.0, 5.0))))
+    assert spy.taken() == (0, 0)
+    # A lamp moves: its own tiles alone.
+    lamps[1] = LAMP | {"position": (2.1, 0.0, 4.0)}
+    shadows.update(scene(lamps, FLOOR, draw(ROOF)))
+    assert spy.taken() == (5, 5)
+    # Something moves under the first one: drawn anew once, with room for what moves; then the
+    # tiles that see it.
+    for x in (0.0, 0.1, 0.2):
+        thing = draw(plane(0.1, 1.0, "thing"), 0, move(x, 0, 0), moving=True)
+        shadows.update(scene(lamps, FLOOR, draw(ROOF), thing))
+        still, moving = spy.taken()
+        assert (still, moving) == ((10, 10) if x == 0.0 else (0, 2))
+
+
+def test_lights_that_need_no_shadows(gl: Any) -> None:
+    """Those without, dark ones, and one below which nothing stands."""
+    spot = LAMP | {"inner": 0.2, "outer": 0.3, "axis": (0.0, 0.0, 1.0)}
+    lamps = [LAMP | {"shadow": 0}, LAMP | {"intensity": 0.0}, spot, LAMP]
+    kinds = maps(gl).update(scene(lamps, FLOOR)).kind.tolist()
+    assert kinds == ["", "", "", "SHADOW_CUBE"]
+    assert maps(gl).update(scene(LAMP, draw(plane(6.0), casts=False))).kind.tolist() == [""]
+    assert maps(gl).update(RenderScene()).kind.tolist() == []
+
+
+def test_lights_that_do_not_fit_shine_without_shadows(gl: Any) -> None:
+    """Tiles of 64: a texture of 1024 holds 16 rows of three lights of five; the nearest have it."""
+    report = Report()
+    shadows = maps(gl, limit=1024, report=report)
+    lamps = [LAMP | {"position": (0.02 * i - 1.0, 0.0, 4.0)} for i in range(60)]
+    shown = scene(lamps, FLOOR, draw(ROOF), camera=Camera(eye=(-2.0, 0.0, 4.0)))
+    kinds = shadows.update(shown).kind
+    assert np.flatnonzero(kinds != "").tolist() == list(range(48))
+    assert shadows.left_out.tolist() == list(range(48, 60))
+    assert report.codes() == {"shadow-budget"}
+    shadows.update(shown)
+    assert len(report) == 1
+    # Seen from a little farther on those that have shadows keep them.
+    near = replace(shown, camera=Camera(eye=(-1.0, 0.0, 4.2)))
+    assert shadows.update(near).kind.tolist() == kinds.tolist()
+
+
+def test_broken_casters_do_no_harm(gl: Any) -> None:
+    broken = plane(0.5, 1.3, "broken")
+    broken.points[1] = np.nan, 0.0, 1e30
+    far = move(0, 0, 0)
+    far[0, 0] = np.inf
+    draws = [draw(broken), draw(broken, moving=True), draw(ROOF, 0, far, moving=True)]
+    assert seen(gl, scene(LAMP, FLOOR, *draws), [(0.3, 0.0, 0.0)])[0] in (0.0, 1.0)
+    share = seen(gl, scene(LAMP, FLOOR, *draws), [(3.0, 0.0, 0.0)])
+    assert share[0] == 1.0
