@@ -18,7 +18,8 @@ from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
 from hdrusd.display import Display, Writer
 from hdrusd.errors import HdrusdError, InputError, SourceRef
 from hdrusd.frames import frame_path
-from hdrusd.gpu.hdr import HdrRenderer, LightMode, Reflection
+from hdrusd.gpu.hdr import HdrRenderer, Options, Reflection
+from hdrusd.gpu.lights import LightMode
 from hdrusd.gpu.program import Programs
 from hdrusd.images import Compression, half_clipped, write_exr, write_png
 from hdrusd.report import Kind, Report
@@ -188,12 +189,16 @@ class Renderer:
                 programs,
                 self.size,
                 self.textures,
-                reflection=job.reflection,
-                gamma=job.gamma,
-                samples=job.samples,
-                shadows=job.shadows,
-                lights=job.lights,
-                sky_samples=job.sky_samples,
+                Options(
+                    reflection=job.reflection,
+                    gamma=job.gamma,
+                    samples=job.samples,
+                    shadows=job.shadows,
+                    lights=job.lights,
+                    sky_samples=job.sky_samples,
+                ),
+                report,
+                SourceRef(job.stage),
             )
         except moderngl.Error as problem:
             width, height = self.size

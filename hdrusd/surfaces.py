@@ -51,7 +51,7 @@ class SurfaceMaker:
         """The material in photometric terms. ``colored``: worn by meshes with vertex colours."""
         rule = self.sidecar.match("material", material.name)
         gamma = self._gamma(rule)
-        diffuse = (rule and rule.color("diffuse")) or material.diffuse
+        diffuse = (rule and rule.three("diffuse")) or material.diffuse
         textured = material.diffuse_map
         if textured is not None and textured.mode in _COVERING:
             diffuse = (1.0, 1.0, 1.0)

@@ -20,7 +20,14 @@ from pxr import Gf, Usd, UsdGeom, UsdShade, UsdValidation
 from hdrusd.colour import luminance
 from hdrusd.errors import SchemaRegistrationError
 from hdrusd.schemas import register
-from hdrusd.usd.lux import connection_end, input_source, is_light, light_kind, read_lux
+from hdrusd.usd.lux import (
+    connection_end,
+    input_source,
+    is_light,
+    light_kind,
+    photometric_file,
+    read_lux,
+)
 
 register()
 
@@ -183,7 +190,11 @@ def check_light(prim: Usd.Prim, span: UsdValidation.ValidationTimeRange) -> Iter
             "WrongQuantity",
             f"inputs:photometric:{wrong} has no meaning on a {kind} light; want {right}",
         )
-    if not broken and kind != "other" and not _has_photometric_file(prim):
+    if kind in _AREA_KINDS and photometric_file(prim):
+        if _authored(prim, "inputs:photometric:luminousIntensity"):
+            text = "luminousIntensity beside a photometric file, whose candela count; want one"
+            yield _Fault("CandelaAndFile", text, warning=True)
+    elif not broken and kind != "other":
         yield from _disagreement(prim, kind in _AREA_KINDS, _times(sources.values(), span))
 
 
@@ -229,13 +240,6 @@ def _disagreement(prim: Usd.Prim, placed: bool, times: list[Usd.TimeCode]) -> It
                 f"{plain:.6g} {unit}{_when(time)}; want both within 0.1 %",
             )
             return
-
-
-def _has_photometric_file(prim: Usd.Prim) -> bool:
-    """Whether the candela are a file's, which the UsdLux inputs only multiply."""
-    names = ("inputs:photometric:file", "inputs:shaping:ies:file")
-    paths = (prim.GetAttribute(name).Get() for name in names if _authored(prim, name))
-    return any(getattr(path, "path", "") for path in paths)
 
 
 _MATERIAL_NUMBERS = {

@@ -81,10 +81,10 @@ def test_checker_passes_right_frames_and_fails_wrong_ones(gl: Any, tmp_path: Pat
 
     (case,) = [case for case in read_cases(FOLDER) if case.id == "point_plane"]
     render_case(gl, case, tmp_path, Report())
-    assert check(FOLDER, tmp_path, [case], None)[0]
+    assert check(case, tmp_path)[0]
     rgb, _ = read_exr(tmp_path / "point_plane.exr")
     write_exr(tmp_path / "point_plane.exr", rgb * np.pi)
-    good, text = check(FOLDER, tmp_path, [case], None)
+    good, text = check(case, tmp_path)
     assert not good
     assert text.count("FAIL") == 4
 

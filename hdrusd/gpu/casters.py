@@ -29,6 +29,9 @@ Booleans = npt.NDArray[np.bool_]
 #: Triangles of a chunk of merged geometry.
 CHUNK = 1024
 
+#: Logarithm of the width of the tables that shadow.vert reads.
+TABLE = 12
+
 #: Corners of all copies of a geometry up to which they are merged.
 _MERGED = 200_000
 
@@ -308,7 +311,7 @@ class Casters:
     def _buffers(
         self, vertices: Floats, indices: npt.NDArray[np.uint32], textured: bool
     ) -> tuple[moderngl.VertexArray, tuple[moderngl.Buffer, ...]]:
-        defines = {"CUTOUT": 1} if textured else None
+        defines = {"TABLE": TABLE} | ({"CUTOUT": 1} if textured else {})
         program = self.programs.get("gpu/shaders/shadow.vert", "gpu/shaders/shadow.frag", defines)
         # An empty buffer is an error of OpenGL.
         buffers = tuple(

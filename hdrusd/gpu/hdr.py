@@ -1,49 +1,76 @@
 """Shader 1: a RenderScene becomes an HDR frame in cd/m2.
 
-Two steps. The surfaces: what each pixel shows, drawn once into the G-buffer
-(gpu/surfaces.py). The lights: one instanced draw call for each class of them, each
-instance adding a batch of lights to every pixel that shows a surface. A batch
-reaches the fragment shader as flat varyings, which on a software device cost a
-third of reading a buffer in every pixel. There is no limit to their number, and
-every light counts everywhere: nothing is cut off by distance.
+The steps of a frame, each a file of its own:
+
+1. ``gpu/surfaces.py``: what each pixel shows, into the G-buffer, with emission and
+   ambient light;
+2. ``gpu/sky.py``: what surfaces mirror of the sky;
+3. ``gpu/lights.py``: every light on every pixel, with shadows (``gpu/shadows.py``) and
+   photometric profiles (``gpu/profiles.py``);
+4. ``gpu/peeling.py``: surfaces that let something through, layer by layer, by the same
+   steps.
+
+A supersampled frame is the mean of such frames (``gpu/supersampling.py``). What else a
+frame could be asked for needs no second renderer: a layer of the G-buffer is a texture
+already; the part of some lights is step 3 with those lights and another target, since
+lights add up; another eye or direction is another ``Camera``.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from hdrusd.errors import SourceRef
 from hdrusd.gpu.light_tables import Extras
-from hdrusd.gpu.lights import PROFILE_UNIT, SAMPLES, SHADOW_UNIT, LightPass
+from hdrusd.gpu.lights import PROFILE_UNIT, SAMPLES, SHADOW_UNIT, LightMode, LightPass
+from hdrusd.gpu.peeling import MAX_LAYERS, Peeling
 from hdrusd.gpu.profiles import PROFILE, ProfileAtlas
 from hdrusd.gpu.program import Programs
 from hdrusd.gpu.shadows import ShadowMaps
+from hdrusd.gpu.sky import SkyPass
+from hdrusd.gpu.sky_occlusion import SkyOcclusion
 from hdrusd.gpu.supersampling import Accumulator, offsets, shifted
 from hdrusd.gpu.surfaces import SurfacePass, set_used
 from hdrusd.gpu.textures import TextureCache
+from hdrusd.photometry.sky import SH_TERMS
+from hdrusd.report import Kind, Report
 from hdrusd.scene import ImageData, RenderScene, TextureRef
 from hdrusd.units import TEXTURE_GAMMA
 
 Reflection = Literal["lambert", "petit2010"]
-LightMode = Literal["auto", "exact", "merged"]
 
 #: Factor between R E and luminance: Lambert's 1/pi, and the paper's 1.
 REFLECTION_SCALE: dict[str, float] = {"lambert": 1.0 / math.pi, "petit2010": 1.0}
 
-#: Layers of the G-buffer, in the order of their attachment.
-LAYERS = ("g_normal", "g_diffuse", "g_specular", "hdr")
+#: Layers of the G-buffer, in the order of their attachment; the last only where it is needed.
+LAYERS = ("g_normal", "g_diffuse", "g_specular", "hdr", "g_extra")
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """How a frame is drawn; what is drawn is in the scene."""
+
+    reflection: Reflection = "lambert"
+    gamma: float = TEXTURE_GAMMA  # of 8-bit textures
+    samples: int = 1  # a pixel
+    shadows: bool = True
+    lights: LightMode = "auto"
+    sky_samples: int = 0  # directions in which the sky may be hidden
 
 
 class HdrRenderer:
     """Draws frames of one size; the HDR texture stays on the GPU until it is read.
 
-    ``load`` decodes a texture (images.py), or gives None and says so itself.
+    ``load`` decodes a texture (images.py), or gives None and says so itself. ``report``
+    takes what cannot be shown as it stands; ``place`` is what the findings are of.
     """
 
     def __init__(
@@ -52,54 +79,159 @@ class HdrRenderer:
         programs: Programs,
         size: tuple[int, int],
         load: Callable[[TextureRef], ImageData | None],
-        *,
-        reflection: Reflection = "lambert",
-        gamma: float = TEXTURE_GAMMA,
-        samples: int = 1,
-        shadows: bool = True,
-        lights: LightMode = "auto",
-        sky_samples: int = 0,
+        options: Options = Options(),
+        report: Report | None = None,
+        place: SourceRef | None = None,
     ) -> None:
         self.ctx = ctx
         self.programs = programs
         self.size = size
-        self.scale = REFLECTION_SCALE[reflection]
-        textures = TextureCache(ctx, load, gamma)
+        self.options = options
+        self.report = Report() if report is None else report
+        self.place = place or SourceRef(Path())
+        self.scale = REFLECTION_SCALE[options.reflection]
+        textures = TextureCache(ctx, load, options.gamma)
         self.surfaces = SurfacePass(ctx, programs, textures, self.scale)
-        self._layers = [ctx.texture(size, 4, dtype="f4") for _ in LAYERS]
-        for layer in self._layers:
-            layer.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        depth = ctx.depth_texture(size)
-        self._gbuffer = ctx.framebuffer(self._layers, depth)
-        self._frame = ctx.framebuffer([self._layers[-1]], depth)
-        self.lights = LightPass(ctx, programs, size, self.scale)
-        self._samples = tuple(offsets(samples))
+        self.lights = LightPass(ctx, programs, size, self.scale, options.lights)
+        self.skies = SkyPass(ctx, programs, load, options.gamma, self.report)
         self._profiles = ProfileAtlas(ctx)
-        self._shadows = ShadowMaps(ctx, programs, textures, samples=SAMPLES) if shadows else None
-        self._sum = Accumulator(ctx, programs, size) if samples > 1 else None
+        self._shadows = None
+        if options.shadows:
+            self._shadows = ShadowMaps(
+                ctx, programs, textures, samples=SAMPLES, report=self.report, place=self.place
+            )
+        self._occlusion = None
+        if options.sky_samples:
+            self._occlusion = SkyOcclusion(
+                ctx,
+                programs,
+                textures,
+                self.skies,
+                size,
+                self.scale,
+                options.sky_samples,
+                self.report,
+            )
+        self._layers = {name: self._texture() for name in LAYERS[:-1]}
+        self._depth = ctx.depth_texture(size)
+        self._gbuffer = ctx.framebuffer(list(self._layers.values()), self._depth)
+        self._frame = ctx.framebuffer([self._layers["hdr"]], self._depth)
+        self._peeling: Peeling | None = None
+        self._samples = tuple(offsets(options.samples))
+        self._sum = Accumulator(ctx, programs, size) if options.samples > 1 else None
 
     @property
     def hdr(self) -> moderngl.Texture:
-        """RGBA32F, cd/m2 in RGB; A is the share of a pixel with a surface; bottom row first."""
-        return self._layers[-1] if self._sum is None else self._sum.texture
+        """RGBA32F, cd/m2 in RGB; A is 0 where nothing was drawn; bottom row first."""
+        return self._layers["hdr"] if self._sum is None else self._sum.texture
 
     def render(self, scene: RenderScene) -> moderngl.Texture:
         """Draw one moment; returns ``hdr``."""
-        self._extras = self._prepare(scene)
+        scene = self.skies.with_suns(scene)
+        extras = self._extras(scene)
         if self._sum is None:
-            self._draw(scene)
+            self._draw(scene, extras)
             return self.hdr
         self._sum.clear()
         for offset in self._samples:
-            self._draw(replace(scene, camera=shifted(scene.camera, offset, self.size)))
-            self._sum.add(self._layers[-1], 1.0 / len(self._samples))
+            camera = shifted(scene.camera, offset, self.size)
+            self._draw(replace(scene, camera=camera), extras)
+            self._sum.add(self._layers["hdr"], 1.0 / len(self._samples))
         return self.hdr
 
-    def _draw(self, scene: RenderScene) -> None:
-        self.draw_surfaces(scene)
-        self.add_lights(scene)
+    def read(self) -> npt.NDArray[np.float32]:
+        """The frame as (h, w, 3) float32 in cd/m2, top row first."""
+        return np.ascontiguousarray(self._read(self.hdr)[..., :3])
 
-    def _prepare(self, scene: RenderScene) -> Extras:
+    def layer(self, name: str) -> npt.NDArray[np.float32]:
+        """A layer of the G-buffer (``LAYERS``; gbuffer.frag) as (h, w, 4), top row first.
+
+        Of the opaque surfaces alone, and of a supersampled frame its last sample.
+        """
+        return self._read(self._layers[name])
+
+    # -- the steps -----------------------------------------------------------------------
+
+    def _draw(self, scene: RenderScene, extras: Extras) -> None:
+        extra = _needs_extra(scene)
+        self.draw_surfaces(scene)
+        layers = {name: self._layers[name] for name in LAYERS if name in self._layers}
+        del layers["hdr"]
+        if not extra:
+            layers.pop("g_extra", None)
+        self._light(scene, layers, self._frame, extras)
+        if self._occlusion is not None:
+            self._occlusion.add(scene, layers, self._frame)
+        self.skies.draw_background(scene, self._frame, self.size)
+        self._add_blended(scene, extras, extra)
+
+    def draw_surfaces(self, scene: RenderScene) -> None:
+        """Step one: G-buffer, and emission plus ambient in the frame."""
+        ctx = self.ctx
+        extra = _needs_extra(scene)
+        if extra and "g_extra" not in self._layers:
+            self._layers["g_extra"] = self._texture()
+            self._gbuffer.release()
+            self._gbuffer = ctx.framebuffer(list(self._layers.values()), self._depth)
+            self._peeling = None
+        self._gbuffer.use()
+        self._gbuffer.clear(depth=1.0)
+        if any(scene.background):
+            self._frame.use()
+            self._frame.clear(*scene.background, 0.0, depth=1.0)
+            self._gbuffer.use()
+        ctx.enable_only(moderngl.DEPTH_TEST)
+        ctx.depth_func = "<"
+        self.surfaces.draw(scene, sky=self._sky(scene), extra="g_extra" in self._layers)
+
+    def _light(
+        self,
+        scene: RenderScene,
+        layers: dict[str, moderngl.Texture],
+        frame: moderngl.Framebuffer,
+        extras: Extras,
+    ) -> None:
+        """Steps two and three on one G-buffer."""
+        self.skies.add_mirrored(scene, layers, frame, self.scale)
+        self.lights.add(scene, layers, frame, extras, self._bind)
+
+    def _add_blended(self, scene: RenderScene, extras: Extras, extra: bool) -> None:
+        """Step four."""
+        if not self.surfaces.blended(scene):
+            return
+        if self._peeling is None:
+            attached = "g_extra" in self._layers
+            self._peeling = Peeling(self.ctx, self.programs, self.size, extra=attached)
+        peeling = self._peeling
+        opaque = self._layers["g_normal"]
+        for layer in peeling.layers(scene, self.surfaces, opaque, sky=self._sky(scene)):
+            layers = dict(layer.textures)
+            if not extra:
+                layers.pop("g_extra", None)
+            self._light(scene, layers, layer.frame, extras)
+        peeling.merge(self._frame)
+        if peeling.truncated:
+            text = f"what lies behind {MAX_LAYERS} blended surfaces is not shown"
+            self.report.add(Kind.DROPPED, "blend-layers", self.place, "", text)
+
+    # -- what the steps need -------------------------------------------------------------
+
+    def _texture(self) -> moderngl.Texture:
+        texture = self.ctx.texture(self.size, 4, dtype="f4")
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        return texture
+
+    def _read(self, texture: moderngl.Texture) -> npt.NDArray[np.float32]:
+        w, h = self.size
+        return np.frombuffer(texture.read(), np.float32).reshape(h, w, 4)[::-1]
+
+    def _sky(self, scene: RenderScene) -> npt.NDArray[np.float32] | None:
+        """What the surfaces get of the sky as they are drawn; None: the scene's ambient alone."""
+        if self._occlusion is not None:
+            return np.zeros((SH_TERMS, 3), np.float32)  # it comes later, where it arrives
+        return self.skies.lux_coefficients(scene) if scene.skies else None
+
+    def _extras(self, scene: RenderScene) -> Extras:
         """What does not depend on where in a pixel is looked: profiles and shadows."""
         self._profiles.update(scene.profiles)
         profiles, kinds = self._profiles.of_lights(scene.lights)
@@ -122,35 +254,8 @@ class HdrRenderer:
             for name, value in self._shadows.uniforms(kind).items():
                 set_used(program, name, value)
 
-    def read(self) -> npt.NDArray[np.float32]:
-        """The frame as (h, w, 3) float32 in cd/m2, top row first."""
-        return np.ascontiguousarray(self._read(self.hdr)[..., :3])
 
-    def layer(self, name: str) -> npt.NDArray[np.float32]:
-        """A layer of the G-buffer (``LAYERS``; gbuffer.frag) as (h, w, 4), top row first.
-
-        Of a supersampled frame: of its last sample.
-        """
-        return self._read(self._layers[LAYERS.index(name)])
-
-    def _read(self, texture: moderngl.Texture) -> npt.NDArray[np.float32]:
-        w, h = self.size
-        return np.frombuffer(texture.read(), np.float32).reshape(h, w, 4)[::-1]
-
-    def draw_surfaces(self, scene: RenderScene) -> None:
-        """Step one: G-buffer, and emission plus ambient in the frame."""
-        ctx = self.ctx
-        self._gbuffer.use()
-        self._gbuffer.clear(depth=1.0)
-        if any(scene.background):
-            self._frame.use()
-            self._frame.clear(*scene.background, 0.0, depth=1.0)
-            self._gbuffer.use()
-        ctx.enable_only(moderngl.DEPTH_TEST)
-        ctx.depth_func = "<"
-        self.surfaces.draw(scene)
-
-    def add_lights(self, scene: RenderScene) -> None:
-        """Step two: every light on every pixel that shows a surface."""
-        layers = dict(zip(LAYERS[:-1], self._layers[:-1], strict=True))
-        self.lights.add(scene, layers, self._frame, self._extras, self._bind)
+def _needs_extra(scene: RenderScene) -> bool:
+    """Whether anything in the scene is read from g_extra: clear coats or light links."""
+    coated = any(m.clearcoat > 0.0 or m.clearcoat_map is not None for m in scene.materials)
+    return coated or bool(np.any(scene.lights["link"] > 0))

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import moderngl
 import numpy as np
@@ -24,6 +24,7 @@ from hdrusd.gpu.surfaces import set_used
 from hdrusd.scene import Camera, Material, RenderScene
 
 Ints = npt.NDArray[np.int32]
+LightMode = Literal["auto", "exact", "merged"]
 Bind = Callable[[moderngl.Program, Sequence[str]], None]
 
 #: Side of a tile, pixels.
@@ -58,9 +59,15 @@ class LightPass:
     """Adds lights to a frame from its G-buffer."""
 
     def __init__(
-        self, ctx: moderngl.Context, programs: Programs, size: tuple[int, int], scale: float
+        self,
+        ctx: moderngl.Context,
+        programs: Programs,
+        size: tuple[int, int],
+        scale: float,
+        mode: LightMode = "auto",
     ) -> None:
         self.ctx = ctx
+        self.mode = mode
         self.programs = programs
         self.size = size
         self.scale = scale

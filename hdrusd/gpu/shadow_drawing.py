@@ -14,7 +14,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.gpu.casters import Group, Run, frustum_sees
+from hdrusd.gpu.casters import TABLE, Group, Run, frustum_sees
 from hdrusd.gpu.program import Programs
 from hdrusd.gpu.surfaces import set_used
 
@@ -27,9 +27,8 @@ _TOGETHER = 256
 #: Instances drawn together, or one tile's: the rest of what bounds it.
 _PAIRS = 250_000
 
-#: Texels of a tile's row in the table (shadow.vert), and width of that table.
+#: Texels of a tile's row in the table (shadow.vert).
 _ROW = 6
-_TABLE = 4096
 
 #: GL_CLIP_DISTANCE0 to 4, which moderngl has no names for.
 _CLIP_DISTANCES = range(0x3000, 0x3005)
@@ -191,7 +190,7 @@ class TileDrawing:
         program = self.programs.get(
             "gpu/shaders/shadow.vert",
             "gpu/shaders/shadow.frag",
-            {"TILES": 1} | ({"RESTORE": 1} if start == "RESTORE" else {}),
+            {"TABLE": TABLE, "TILES": 1} | ({"RESTORE": 1} if start == "RESTORE" else {}),
         )
         self._uniforms(program, 0)
         set_used(program, "fill", 1.0)
@@ -257,9 +256,10 @@ class _Table:
 
 
 def _texels(ctx: moderngl.Context, data: npt.NDArray[Any], dtype: str) -> moderngl.Texture:
-    height = -(-len(data) // _TABLE)
-    padded = np.zeros((height * _TABLE, data.shape[1]), data.dtype)
+    width = 1 << TABLE
+    height = -(-len(data) // width)
+    padded = np.zeros((height * width, data.shape[1]), data.dtype)
     padded[: len(data)] = data
-    texture = ctx.texture((_TABLE, height), data.shape[1], padded, dtype=dtype)
+    texture = ctx.texture((width, height), data.shape[1], padded, dtype=dtype)
     texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
     return texture

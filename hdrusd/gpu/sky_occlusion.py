@@ -137,13 +137,12 @@ class SkyOcclusion:
         groups = [*self._casters.still, *self._casters.moving]
         number = np.arange(BATCH)
         squares = TILE * np.column_stack([number % columns, number // columns, number * 0 + 1])
-        side = TILE / np.array(size)
         for first in range(0, len(directions), BATCH):
             chosen = slice(first, first + BATCH)
             count = len(directions[chosen])
             self._tiles.draw_still(views.tiles(chosen, squares[:count]), groups)
             values = {
-                **views.uniforms(chosen, squares[:count, :2] / size, side, eye),
+                **views.uniforms(chosen, squares[:count], eye),
                 "luminance": np.append(luminance[chosen], views.scales(chosen), axis=1),
             }
             # A batch that is not full is filled with darkness.
@@ -153,6 +152,7 @@ class SkyOcclusion:
             self.ctx.blend_func = moderngl.ONE, moderngl.ONE
             self._tiles.use(len(layers))
             units = {"depths": len(layers), "texel": views.texel}
+            units["inverse_size"] = 1.0 / size[0], 1.0 / size[1]
             self._draw(program, scene, layers, units | full)
         self.ctx.enable_only(moderngl.NOTHING)
 
@@ -250,16 +250,16 @@ class Views:
         return self._scale[chosen, None] / 2.0
 
     def uniforms(
-        self, chosen: slice, corners: Doubles, side: Doubles, eye: Doubles
+        self, chosen: slice, squares: npt.NDArray[Any], eye: Doubles
     ) -> dict[str, Doubles]:
-        """Of sky_occlusion.frag: from places relative to the eye to the texture, 0 to 1."""
+        """Of sky_occlusion.frag: from places relative to the eye to texels and depth."""
         at_eye = np.append(eye, 1.0)
         found = {}
         for axis, (name, row) in enumerate((("across", self.x), ("along", self.y))):
             moved = row[chosen].copy()
             moved[:, 3] = moved @ at_eye
-            moved *= side[axis] / 2.0
-            moved[:, 3] += corners[:, axis] + side[axis] / 2.0
+            moved *= TILE / 2.0
+            moved[:, 3] += squares[:, axis] + TILE / 2.0
             found[name] = moved
         depth = self.z[chosen] @ at_eye / 2.0 + 0.5
         found["towards"] = np.column_stack([self.directions[chosen], depth])

@@ -46,7 +46,7 @@ class Beams:
         return self.table[:, 10]
 
     def along_and_across(self, way: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats]:
-        """m along the axis and off it of ``way``, from the lights to places."""
+        """How far ``way``, from the lights to places, goes along the axis and off it, m."""
         (x, y, z), (a, b, c) = way, self.table.T[:3]
         # Not from d2 and the first, which leaves nothing of a narrow beam's width.
         u, v, w = y * c - z * b, z * a - x * c, x * b - y * a

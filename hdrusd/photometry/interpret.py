@@ -9,18 +9,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from math import pi, sqrt
 from typing import Literal
 
 from hdrusd.legacy import scene as legacy
 from hdrusd.legacy.scene import RGB
 from hdrusd.photometry.estimate import Estimate
 from hdrusd.photometry.light import PhotometricLight, Provenance, chromaticity
+from hdrusd.photometry.luminaire import Luminaire, Opening
 from hdrusd.photometry.sidecar import Rule
 from hdrusd.report import Kind, Report
 from hdrusd.units import LUMINANCE_WEIGHTS
 
 #: Radius of a lamp whose size nobody states, m; only other renderers' values depend on it.
 LAMP_RADIUS = 0.05
+
+#: Radius of a lamp that has a size, m; a smaller one is a point, a larger one a mistake.
+_LEAST_RADIUS, _LARGEST_RADIUS = 1e-3, 1e3
 
 #: The strongest light that is written, cd or lx: its luminance must fit into 32-bit floats.
 _STRONGEST = 1e30
@@ -38,11 +43,19 @@ def rule_color(rule: Rule | None, temperature: TemperatureToRGB) -> RGB | None:
     """The chromaticity that a photometry rule states, luminance 1; None when it states none."""
     if rule is None:
         return None
-    color = rule.color()
+    color = rule.three("color")
     if color is not None and luminance(color) > 0.0:
         return chromaticity(color)[0]
     kelvin = rule.number("temperature")
     return temperature(kelvin) if kelvin else None
+
+
+@dataclass(frozen=True, slots=True)
+class LuminaireFile:
+    """A photometric file of a rule, read, and the name by which the stage has it."""
+
+    name: str
+    luminaire: Luminaire
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,25 +72,39 @@ class Interpreter:
     temperature: TemperatureToRGB
     report: Report
 
-    def light(self, light: legacy.Light, rule: Rule | None) -> PhotometricLight | None:
-        """The lamp, or None where it is switched off or dark. House rule: one light, end to end."""
+    def light(
+        self, light: legacy.Light, rule: Rule | None, file: LuminaireFile | None = None
+    ) -> PhotometricLight | None:
+        """The lamp, or None where it is switched off or dark. House rule: one light, end to end.
+
+        ``file``: that of the rule's ``ies``, if there is one and it can be read.
+        """
         enabled = light.enabled if rule is None else rule.values.get("enabled", light.enabled)
         if not enabled:
             self._note(light, Kind.DROPPED, "light-off", "switched off; not written")
             return None
         light = self._without_negative_colours(light)
+        if rule is not None and "ies" in rule.values and light.kind in ("directional", "ambient"):
+            text = f"{rule.place}: a light without a place takes no photometric file"
+            self._note(light, Kind.DROPPED, "profile-unused", text)
+            file = None
         if light.kind == "ambient":
             return self._ambient_light(light, rule)
         kind: Literal["point", "distant"] = "distant" if light.kind == "directional" else "point"
         color, strength = chromaticity(light.diffuse)
-        intensity, provenance, name, source = self._strength(light, rule, kind, strength)
+        if rule is not None and file is not None:
+            intensity, provenance = _factor(rule, file.luminaire), rule.provenance
+            name, source = str(rule.place), rule.source
+        else:
+            intensity, provenance, name, source = self._strength(light, rule, kind, strength)
         if rule is not None:
             color = rule_color(rule, self.temperature) or color
         if intensity <= 0.0:
             self._note(light, Kind.DROPPED, "light-dark", "gives no light; not written")
             return None
-        if not intensity <= _STRONGEST:
-            text = f"{intensity:g} is beyond 32-bit floats; not written"
+        peak = 1.0 if file is None else max(float(file.luminaire.candela.max()), 1.0)
+        if not intensity * peak <= _STRONGEST:
+            text = f"{intensity * peak:g} is beyond 32-bit floats; not written"
             self._note(light, Kind.INVALID, "light-intensity", text)
             return None
         self._note_differences(light)
@@ -89,7 +116,36 @@ class Interpreter:
             rule=name,
             source=source,
         )
-        return lamp if kind == "distant" else self._with_lamp(lamp, light, rule)
+        if kind == "distant":
+            return lamp
+        if file is not None:
+            return self._with_file(lamp, light, rule, file)
+        return self._with_lamp(lamp, light, rule)
+
+    def _with_file(
+        self,
+        lamp: PhotometricLight,
+        light: legacy.Light,
+        rule: Rule | None,
+        file: LuminaireFile,
+    ) -> PhotometricLight:
+        """What a photometric file says in the place of a cone: where the light goes, its size."""
+        if light.spot_cutoff < 180.0 or light.spot_exponent > 0.0:
+            text = f"cone and exponent replaced by the candela of {file.luminaire.name}"
+            self._note(light, Kind.REPLACED, "light-cone", text)
+        radius = self._radius(light, rule, _opening_radius(file.luminaire.opening))
+        return replace(lamp, profile=file.name, radius=radius)
+
+    def _radius(
+        self, light: legacy.Light, rule: Rule | None, of_file: float | None = None
+    ) -> float:
+        """The lamp's size: the rule's, else the photometric file's, else a stated guess."""
+        radius = (rule.number("radius") if rule else None) or of_file
+        if radius is None:
+            radius = LAMP_RADIUS
+            text = f"lamp of {LAMP_RADIUS} m radius; none is stated"
+            self._note(light, Kind.ASSUMED, "lamp-radius", text)
+        return radius
 
     def _with_lamp(
         self, lamp: PhotometricLight, light: legacy.Light, rule: Rule | None
@@ -100,18 +156,13 @@ class Interpreter:
             cutoff = max(light.spot_cutoff, 0.0)
             if light.spot_inner is not None and cutoff > 0.0:
                 softness = 1.0 - min(max(light.spot_inner, 0.0), cutoff) / cutoff
-        radius = rule.number("radius") if rule else None
-        if radius is None:
-            radius = LAMP_RADIUS
-            text = f"lamp of {LAMP_RADIUS} m radius; none is stated"
-            self._note(light, Kind.ASSUMED, "lamp-radius", text)
         return replace(
             lamp,
             kind="spot" if cutoff < 180.0 or light.spot_exponent > 0.0 else "point",
             cutoff=cutoff,
             softness=softness,
             exponent=max(light.spot_exponent, 0.0),
-            radius=radius,
+            radius=self._radius(light, rule),
         )
 
     def _without_negative_colours(self, light: legacy.Light) -> legacy.Light:
@@ -259,6 +310,23 @@ class Interpreter:
         self, thing: legacy.Light | legacy.Material, kind: Kind, code: str, text: str
     ) -> None:
         self.report.add(kind, code, thing.source, thing.name, text)
+
+
+def _factor(rule: Rule, luminaire: Luminaire) -> float:
+    """What a rule multiplies the candela of its photometric file by."""
+    lumens = rule.number("lumens")
+    if lumens is not None:
+        flux = luminaire.flux()
+        return lumens / flux if flux > 0.0 else 0.0
+    scale = rule.number("scale")
+    return 1.0 if scale is None else scale
+
+
+def _opening_radius(opening: Opening) -> float | None:
+    """m, of the sphere whose cross-section is the luminous opening; None of a point."""
+    area = opening.x * opening.y * (pi / 4.0 if opening.round else 1.0)
+    radius = sqrt(max(area, 0.0) / pi)
+    return radius if _LEAST_RADIUS <= radius <= _LARGEST_RADIUS else None
 
 
 def _not_negative(color: RGB) -> RGB:

@@ -29,7 +29,9 @@ class PhotometricLight:
     """What a lamp is, independent of where it stands.
 
     ``intensity`` is the photometric strength: cd on the axis, or lux on a facing
-    plane for "distant" (on a horizontal plane under open sky for "ambient").
+    plane for "distant" (on a horizontal plane under open sky for "ambient"). With a
+    ``profile``, a photometric file as the stage names it, it is the factor on the
+    file's candela.
     ``chromaticity`` is linear Rec. 709 with a luminance of 1, so that their
     product is the strength per channel.
     """
@@ -41,6 +43,7 @@ class PhotometricLight:
     softness: float = 0.0  # share of the cone over which it fades (UsdLux)
     exponent: float = 0.0  # of cos(angle to the axis)
     radius: float = 0.05  # m
+    profile: str = ""
     provenance: Provenance = "estimated"
     rule: str = ""
     source: str = ""

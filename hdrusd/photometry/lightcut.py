@@ -35,11 +35,11 @@ least I / ((|c - t| + T)^2 + M / I) (Jensen). So for each point of the tile and 
 the right side being what a small ball there catches from all sides (scalar illuminance, without
 occluders). In each channel, the right side by the strongest one.
 
-Highlights are not bounded so: a lobe may show a far lamp alone. On a tile with a lobe of w rad
-(the standard deviation of the half vector H about the normal: 1 / sqrt(n) for Blinn-Phong,
-alpha / 2 for GGX) lamps merge only while they turn H by less than ``LOBE_SHARE`` of it:
-sqrt(M / I) / r <= LOBE_SHARE w |L + V|, where |dH| <= |dL| / |L + V| for unit vectors L, V to
-lamp and eye. At grazing angles |L + V| is small, so lamps ahead keep their streaks on a wet road.
+Highlights are not bounded so: a lobe may show a far lamp alone. On a tile with a lobe as wide
+as alpha over the half vector H (rad: alpha of GGX, sqrt(2 / (n + 2)) of Blinn-Phong) lamps merge
+only while they turn H by less than ``LOBE_SHARE`` of it: sqrt(M / I) / r <= LOBE_SHARE alpha
+|L + V|, where |dH| <= |dL| / |L + V| for unit vectors L, V to lamp and eye. At grazing angles
+|L + V| is small, so lamps ahead keep their streaks on a wet road.
 """
 
 from __future__ import annotations
@@ -50,7 +50,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.photometry.beam import Beams, beams_of
-from hdrusd.photometry.lighttree import LightTree
+from hdrusd.photometry.lighttree import LightTree, extent
+from hdrusd.scene import DISK, NO_CONE, RECT
 
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
@@ -62,8 +63,8 @@ Indices = npt.NDArray[np.intp]
 #: worst place and normal of a tile would see of each node: measured errors are a tenth of it.
 EPSILON = 0.03
 
-#: How far merged lamps may turn the half vector, in standard deviations of the lobe.
-LOBE_SHARE = 0.7
+#: How far (rms) merged lamps may turn the half vector, in widths of the narrowest lobe.
+LOBE_SHARE = 0.5
 
 #: |L + V| that counts where it is less: there the half vector has no direction any more.
 _LEAST_SUM = 0.02
@@ -84,7 +85,7 @@ class Tiles:
 
     centre: Floats  # (m, 3)
     radius: Floats
-    lobe: Floats  # rad: standard deviation of the narrowest lobe's half vector; inf: none
+    lobe: Floats  # rad: alpha of the narrowest lobe; inf: none
     toward_eye: Floats  # (m, 3) unit vectors
 
     def part(self, first: int, last: int) -> Tiles:
@@ -114,22 +115,55 @@ def cut(
     return tile, row
 
 
+def reached(lights: npt.NDArray[np.void], eye: npt.ArrayLike, tiles: Tiles) -> tuple[Ints, Ints]:
+    """Where lights with a beam or a dark side shine: pairs (tile, light), in order of the tiles.
+
+    A pair is left out where no point of the tile's ball lies in the light's outer cone or
+    before a flat light's face, which changes nothing; without either, none is.
+    """
+    table = lights.copy()
+    flat = np.isin(lights["shape"], (RECT, DISK)) & (lights["w"] > 0.0)
+    # Nothing shines out of its back: no cone of it is wider than a half space.
+    table["outer"] = np.where(flat, np.minimum(lights["outer"], np.pi / 2), lights["outer"])
+    table["inner"] = np.minimum(lights["inner"], table["outer"])
+    table["outer"] = np.where(lights["w"] > 0.0, table["outer"], NO_CONE)
+    beams = beams_of(table)
+    parts = [np.zeros((2, 0), np.int32)]
+    step = max(_PAIRS // max(len(lights), 1), 1)
+    with np.errstate(all="ignore"):
+        places = (lights["position"] - np.asarray(eye, np.float64)).astype(np.float32).T
+        size = extent(lights).astype(np.float32)
+        for first in range(0, len(tiles.radius), step):
+            part = tiles.part(first, first + step)
+            x, y, z = (c[:, None] - p for c, p in zip(part.centre.T, places, strict=True))
+            along, across = beams.along_and_across((x, y, z))
+            distance = np.sqrt(x * x + y * y + z * z)
+            dark = beams.misses(along, across, distance, part.radius[:, None] + size)
+            tile, light = np.nonzero(~dark)
+            parts.append(np.stack([tile + first, light]).astype(np.int32))
+    tile, light = np.concatenate(parts, axis=1)
+    return tile, light
+
+
 class _Nodes:
     """Columns of the tree as the bound needs them, float32, relative to the eye."""
 
     def __init__(self, tree: LightTree, eye: Doubles) -> None:
         self.tree = tree
-        x, y, z = (tree.position - eye).T.astype(np.float32)
         lamp = np.maximum(tree.lamp, np.float32(1e-6))
-        # Nearer than its radius a lamp is no point. A leaf is right at any distance.
-        nearest = np.where(tree.child < 0, np.float32(-np.inf), lamp)
-        softness = tree.variance + lamp * lamp
-        moment, first_order = tree.strength * tree.variance, tree.strength * tree.spread
+        columns = [
+            *(tree.position - eye).T,
+            tree.radius,
+            tree.strength,
+            tree.variance + lamp * lamp,
+            tree.strength * tree.variance,
+            tree.strength * tree.spread,
+            # Nearer than its radius a lamp is no point. A leaf is right at any distance.
+            np.where(tree.child < 0, np.float32(-np.inf), lamp),
+            tree.variance,
+        ]
         # A row a node: to fetch it takes a seventh of fetching from ten columns.
-        self.table = np.column_stack(
-            [x, y, z, tree.radius, tree.strength, softness]
-            + [moment, first_order, nearest, tree.variance]
-        ).astype(np.float32)
+        self.table = np.column_stack(columns).astype(np.float32)
         self.beams = beams_of(tree.beams)
         self.inner = tree.child >= 0
         child = np.where(self.inner, tree.child, 0)
@@ -184,7 +218,9 @@ class _Cut:
             if not np.any(split):
                 break
             tile, node = self.children(tile[split], node[split], light[split])
-        return tuple(np.concatenate(k) for k in zip(*self.leaves, (tile, node), strict=True))
+        self.leaves.append((tile, node))
+        tiles, found = zip(*self.leaves, strict=True)
+        return np.concatenate(tiles), np.concatenate(found)
 
     def start(self) -> tuple[Indices, Indices, Floats]:
         """Go through the first levels; what is left to look at, and the bound a node may have."""
@@ -202,7 +238,7 @@ class _Cut:
                 if shaped is not None:
                     lit[:, some] = found[2]
         fringe = np.ones(n, np.bool_)
-        fringe[nodes.parent[: n][nodes.parent[:n] >= 0]] = False
+        fringe[nodes.parent[:n][nodes.parent[:n] >= 0]] = False
         total = light[:, fringe].sum(axis=1)
         shares = min(_SHARES, max(tree.merged, 1))
         limit = (self.epsilon / shares * total).astype(np.float32)
@@ -218,7 +254,8 @@ class _Cut:
         self.merged.append((tile, node, error[tile, node], light[tile, node]))
         leaf = take & ~nodes.inner[:n]
         self.light += np.where(leaf, light, 0.0).sum(axis=1)
-        self.leaves.append(np.nonzero(leaf))
+        at, lamp = np.nonzero(leaf)
+        self.leaves.append((at, lamp))
         tile, node = np.nonzero(open_ & fringe)
         return *self.children(tile, node, light[tile, node]), limit
 
@@ -245,11 +282,14 @@ class _Cut:
                 tile, node = (np.concatenate(k) for k in zip(*parts, strict=True))
                 return tile, node
         shaped = nodes.beams.take(beam) if beam is not None and beam[0] >= 0 else None
-        tiles, rows = (np.take(k, i, axis=0).T for k, i in ((self.table, tile), (nodes.table, node)))
+        tiles, rows = (
+            np.take(k, i, axis=0).T for k, i in ((self.table, tile), (nodes.table, node))
+        )
         error, light, lit = bound(tiles, rows, shaped)
         inner = np.take(nodes.inner, node)
         if shaped is not None:
-            tile, node, error, light, inner = (k[lit] for k in (tile, node, error, light, inner))
+            tile, node, inner = tile[lit], node[lit], inner[lit]
+            error, light = error[lit], light[lit]
         fine = error <= np.take(limit, tile)
         held = np.flatnonzero(fine & inner)
         self.merged.append((tile[held], node[held], error[held], light[held]))
@@ -260,9 +300,7 @@ class _Cut:
         return self.children(tile[split], node[split], light[split])
 
 
-def bound(
-    tiles: Floats, nodes: Floats, beams: Beams | None
-) -> tuple[Floats, Floats, Bools | None]:
+def bound(tiles: Floats, nodes: Floats, beams: Beams | None) -> tuple[Floats, Floats, Bools | None]:
     """Of pairs: error bound, least light, both lx of a facing plane; may it be lit at all.
 
     An infinite error: these lamps may not merge here. Columns that broadcast: of tiles

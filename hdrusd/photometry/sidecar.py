@@ -6,9 +6,20 @@
     [[light]]
     match = "Luminaire_*"       # shell pattern on the light's or its node's name
     candela = 3200
+    [[light]]
+    match = "RoadLamp_*"
+    ies = "road.ies"            # LM-63 or EULUMDAT, relative to this file
+    lumens = 5600               # of the luminaire; or scale, a factor on the file's candela
+    axis = [0, 0, -1]           # where gamma = 0 points, in the axes of the light's node
+    c0 = [1, 0, 0]              # where C = 0 points
     [[material]]
     match = "LampGlass*"
     luminance = 12000           # cd/m2
+    [[material]]
+    match = "WetRoad"
+    diffuse = [0.5, 0.5, 0.5]   # D of R = T^gamma D
+    specular = [0.02, 0.02, 0.02]  # reflectance at normal incidence
+    roughness = 0.3             # GGX; or shininess, Blinn and Phong's exponent
     [[camera]]
     match = "Driver"            # a node that becomes a camera
     fov = 50                    # degrees, vertical
@@ -48,11 +59,24 @@ class _Range:
         return f"a number from {self.least:g} to {self.most:g}"
 
 
+@dataclass(frozen=True, slots=True)
+class _Three:
+    """A list of three numbers that a key takes; ``some``: not all of them 0."""
+
+    each: _Range
+    some: str = ""  # what three zeros lack
+
+    def __str__(self) -> str:
+        return f"three of {self.each}"
+
+
 #: cd, lx or cd/m2: 32-bit floats end at 3e38, and a lamp of 1 mm makes nits of candela times 3e5.
 _STRENGTH = _Range(0.0, 1e30)
 _KELVIN = _Range(1000.0, 10_000.0)  # the range of UsdLux's blackbody colours
 _GAMMA = _Range(0.1, 10.0)
-_CHANNEL = _Range(0.0, 1e6)
+_RGB = _Three(_Range(0.0, 1e6))
+_HUE = _Three(_RGB.each, "black has no hue; want a number above 0")
+_DIRECTION = _Three(_Range(-1e6, 1e6), "no direction; want a number other than 0")
 _COMMON: dict[str, Any] = {"match": str, "source": str, "provenance": str}
 _KEYS: dict[str, dict[str, Any]] = {
     "light": _COMMON
@@ -60,7 +84,12 @@ _KEYS: dict[str, dict[str, Any]] = {
         "candela": _STRENGTH,
         "illuminance": _STRENGTH,
         "temperature": _KELVIN,
-        "color": list,
+        "color": _HUE,
+        "ies": str,
+        "scale": _Range(0.0, 1e6),
+        "lumens": _STRENGTH,
+        "axis": _DIRECTION,
+        "c0": _DIRECTION,
         "radius": _Range(1e-3, 1e3),  # m
         "enabled": bool,
     },
@@ -69,9 +98,12 @@ _KEYS: dict[str, dict[str, Any]] = {
         "luminance": _STRENGTH,
         "hdr_texture": bool,
         "temperature": _KELVIN,
-        "color": list,
-        "diffuse": list,
+        "color": _HUE,
+        "diffuse": _RGB,
         "gamma": _GAMMA,
+        "specular": _Three(_Range(0.0, 1.0)),
+        "roughness": _Range(0.0, 1.0),
+        "shininess": _Range(0.0, 1e5),
     },
     "camera": {
         "match": str,
@@ -84,10 +116,16 @@ _KEYS: dict[str, dict[str, Any]] = {
 _AMBIENT = {
     "illuminance": _STRENGTH,
     "temperature": _KELVIN,
-    "color": list,
+    "color": _HUE,
     "source": str,
     "provenance": str,
 }
+
+#: Keys that say something only beside another one.
+_COMPANIONS = {"scale": "ies", "lumens": "ies", "axis": "ies", "c0": "ies"}
+
+#: Of two keys that say one thing the first counts.
+_RIVALS = (("lumens", "scale"), ("ies", "candela"), ("roughness", "shininess"))
 
 
 @dataclass(slots=True)
@@ -110,8 +148,8 @@ class Rule:
         value = self.values.get(key)
         return None if value is None else float(value)
 
-    def color(self, key: str = "color") -> tuple[float, float, float] | None:
-        """A linear Rec. 709 colour, or None."""
+    def three(self, key: str) -> tuple[float, float, float] | None:
+        """A linear Rec. 709 colour or a direction, or None."""
         value = self.values.get(key)
         return None if value is None else (float(value[0]), float(value[1]), float(value[2]))
 
@@ -207,6 +245,7 @@ def _read_section(sidecar: Sidecar, section: str, tables: Any, report: Report) -
     for number, table in enumerate(tables, start=1):
         place = SourceRef(sidecar.path, f"{section}[{number}]")
         values = _checked(table, _KEYS[section], place, report)
+        _note_company(values, place, report)
         if "match" in values:
             sidecar.rules.append(Rule(section, place, values))
         else:
@@ -225,17 +264,28 @@ def _checked(
             _invalid(report, place, key, f"{_shown(value)}; want {_wanted(keys[key])}")
         elif key == "provenance" and value not in get_args(Provenance):
             _invalid(report, place, key, f"{_shown(value)}; want {', '.join(get_args(Provenance))}")
-        elif key == "color" and not any(value):
-            _invalid(report, place, key, "black has no hue; want a number above 0")
+        elif isinstance(keys[key], _Three) and keys[key].some and not any(value):
+            _invalid(report, place, key, keys[key].some)
         else:
             good[key] = value
     return good
 
 
+def _note_company(values: Mapping[str, Any], place: SourceRef, report: Report) -> None:
+    """A finding for each key that lacks its companion, or has a rival."""
+    for key, companion in _COMPANIONS.items():
+        if key in values and companion not in values:
+            _invalid(report, place, key, f"not used without {companion}")
+    for first, second in _RIVALS:
+        if first in values and second in values:
+            text = f"{first} beside it says the same and is used"
+            report.add(Kind.INVALID, "sidecar-rival", place, second, text)
+
+
 def _fits(value: Any, kind: Any) -> bool:
-    if kind is list:
-        channels = isinstance(value, list) and len(value) == 3
-        return channels and all(_fits(v, _CHANNEL) for v in value)
+    if isinstance(kind, _Three):
+        three = isinstance(value, list) and len(value) == 3
+        return three and all(_fits(v, kind.each) for v in value)
     if isinstance(kind, _Range):
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
         return number and kind.least <= value <= kind.most
@@ -243,9 +293,7 @@ def _fits(value: Any, kind: Any) -> bool:
 
 
 def _wanted(kind: Any) -> str:
-    if kind is list:
-        return f"three of {_CHANNEL}"
-    if isinstance(kind, _Range):
+    if isinstance(kind, (_Range, _Three)):
         return str(kind)
     return "true or false" if kind is bool else "a string"
 

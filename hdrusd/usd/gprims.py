@@ -127,7 +127,7 @@ class GprimReader:
         return tuple(_merge(draws))
 
     def _plan(self, prim: Usd.Prim, code: Usd.TimeCode) -> Gprim | None:
-        skin = self._skins.of(prim) if prim.IsA(UsdGeom.Mesh) else None
+        skin = self._skins.of(prim)
         # Instances share their prototype's shape, but each may have an animation of its own.
         shared = prim.GetPrimInPrototype() if prim.IsInstanceProxy() and skin is None else prim
         return Gprim(

@@ -2,7 +2,8 @@
 
 The photometric attributes are the truth; plain UsdLux values that mean the same
 stand beside them for every other renderer: nits, ``normalize`` 0, a real radius
-(docs/decisions/0007).
+(docs/decisions/0007). A light with a photometric file has no photometric attribute: the
+file's candela are the truth, which UsdLux inputs multiply (usd/profile.py).
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from hdrusd.photometry.light import PhotometricLight
 from hdrusd.report import Kind, Report
 from hdrusd.scene import NO_CONE, light_rows
 from hdrusd.units import LUMINANCE_WEIGHTS, distant_luminance, dome_luminance, sphere_luminance
-from hdrusd.usd.lux import LuxReading, input_number, read_lux
+from hdrusd.usd.lux import LuxReading, input_number, photometric_file, read_lux
 
 #: Full angle of a distant light that we write: the sun's and the moon's, degrees.
 DISTANT_ANGLE = 0.53
@@ -62,8 +63,9 @@ def write_light(
     api.CreateColorAttr(color)
     api.CreateNormalizeAttr(False)
     prim.ApplyAPI(_API)
-    name = _INTENSITY if light.kind in ("point", "spot") else _ILLUMINANCE
-    prim.CreateAttribute(name, Sdf.ValueTypeNames.Float, False).Set(light.intensity)
+    if not light.profile:
+        name = _INTENSITY if light.kind in ("point", "spot") else _ILLUMINANCE
+        prim.CreateAttribute(name, Sdf.ValueTypeNames.Float, False).Set(light.intensity)
     _uniform(prim, "photometric:provenance", Sdf.ValueTypeNames.Token, light.provenance)
     if light.rule:
         _uniform(prim, "photometric:rule", Sdf.ValueTypeNames.String, light.rule)
@@ -94,8 +96,9 @@ def read_light(prim: Usd.Prim, *, scale: float = 1.0) -> PhotometricLight:
     shaping = UsdLux.ShapingAPI(prim)
     has_cone = prim.HasAPI(UsdLux.ShapingAPI)
     cutoff = float(shaping.GetShapingConeAngleAttr().Get()) if has_cone else 180.0
+    exponent = float(shaping.GetShapingFocusAttr().Get()) if has_cone else 0.0
     kinds = {"distant": "distant", "dome": "ambient"}
-    kind = kinds.get(reading.kind, "spot" if has_cone else "point")
+    kind = kinds.get(reading.kind, "spot" if cutoff < 180.0 or exponent > 0.0 else "point")
 
     def get(name: str) -> str:
         attribute = prim.GetAttribute(name)
@@ -107,8 +110,9 @@ def read_light(prim: Usd.Prim, *, scale: float = 1.0) -> PhotometricLight:
         chromaticity=(float(color[0]), float(color[1]), float(color[2])),
         cutoff=cutoff,
         softness=float(shaping.GetShapingConeSoftnessAttr().Get()) if has_cone else 0.0,
-        exponent=float(shaping.GetShapingFocusAttr().Get()) if has_cone else 0.0,
+        exponent=exponent,
         radius=reading.radius or 0.05,
+        profile=photometric_file(prim),
         provenance=get("photometric:provenance") or "authored",  # type: ignore[arg-type]
         rule=get("photometric:rule"),
         source=get("photometric:source"),
@@ -195,6 +199,8 @@ def _photometric(
     attribute = prim.GetAttribute(name)
     if not attribute or not attribute.HasAuthoredValue():
         return luminance, color
+    if photometric_file(prim) and not distant:  # whose candela the UsdLux inputs multiply
+        return luminance, color
     stated = input_number(prim, name.removeprefix("inputs:"), time)
     if report is not None and abs(stated - luminance) > AGREEMENT * max(stated, luminance):
         unit = "lx" if distant else "cd"
@@ -218,9 +224,11 @@ def _note_unused(prim: Usd.Prim, time: Usd.TimeCode, report: Report) -> None:
 
 
 def _write_shaping(prim: Usd.Prim, light: PhotometricLight) -> None:
-    if light.cutoff >= 180.0 and light.exponent == 0.0:
+    if light.cutoff >= 180.0 and light.exponent == 0.0 and not light.profile:
         return
     shaping = UsdLux.ShapingAPI.Apply(prim)
+    if light.profile:
+        shaping.CreateShapingIesFileAttr(Sdf.AssetPath(light.profile))
     shaping.CreateShapingConeAngleAttr(light.cutoff)
     shaping.CreateShapingConeSoftnessAttr(light.softness)
     shaping.CreateShapingFocusAttr(light.exponent)

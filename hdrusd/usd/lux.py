@@ -29,7 +29,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 from hdrusd import units
 
@@ -106,6 +106,16 @@ def input_source(prim: Usd.Prim, name: str) -> Usd.Attribute:
         return own
     end = connection_end(own)
     return end if UsdShade.Input.IsInput(end) and end.HasValue() else own
+
+
+def photometric_file(prim: Usd.Prim) -> str:
+    """The photometric file of a light, as the stage names it; empty where it has none.
+
+    Its candela are the light's, and what ``read_lux`` gives is a factor on them.
+    """
+    source = input_source(prim, "shaping:ies:file") if prim.HasAPI(UsdLux.ShapingAPI) else None
+    asset = source.Get() if source else None
+    return str(asset.path) if isinstance(asset, Sdf.AssetPath) else ""
 
 
 def read_lux(

@@ -33,6 +33,7 @@ class Skin:
 
     query: UsdSkel.SkinningQuery
     skeleton: UsdSkel.SkeletonQuery
+    bones: Usd.Prim  # the skeleton where it stands; the query has that of the prototype
     report: Report
     jointed: bool  # joints move it: its points come out in the skeleton's space
     rigid: bool  # joints move it as a whole
@@ -49,14 +50,14 @@ class Skin:
         """Whether the place of all points together may change in time."""
         if not self.jointed:
             return place_varies(self.query.GetPrim())
-        return place_varies(self.skeleton.GetPrim()) or (self.rigid and self.varies)
+        return place_varies(self.bones) or (self.rigid and self.varies)
 
     def place(self, cache: UsdGeom.XformCache) -> Doubles:
         """(4, 4) from what ``points`` gives to the world, row vectors, scene units."""
         if not self.jointed:
             prim = self.query.GetPrim()
             return np.array(cache.GetLocalToWorldTransform(prim), np.float64)
-        world = np.array(cache.GetLocalToWorldTransform(self.skeleton.GetPrim()), np.float64)
+        world = np.array(cache.GetLocalToWorldTransform(self.bones), np.float64)
         if not self.rigid:
             return world
         try:
@@ -176,7 +177,13 @@ class Skins:
         path = root.GetPath()
         if path not in self._roots:
             self._roots[path] = self._search(UsdSkel.Root(root))
-        return self._roots[path].get(prim.GetPath())
+        skin = self._roots[path].get(prim.GetPath())
+        if skin is None or prim.IsA(UsdGeom.Mesh) or (skin.rigid and not skin.points_vary):
+            return skin
+        place = SourceRef(Path(prim.GetStage().GetRootLayer().identifier))
+        text = f"{prim.GetTypeName()} follows its joints as a whole or not at all; shown without"
+        self.report.add(Kind.DROPPED, "skel-binding", place, str(prim.GetPath()), text)
+        return None
 
     def _search(self, root: UsdSkel.Root) -> dict[Sdf.Path, Skin]:
         self._cache.Populate(root, _PREDICATE)
@@ -195,6 +202,7 @@ class Skins:
                 found[query.GetPrim().GetPath()] = Skin(
                     query,
                     skeleton,
+                    binding.GetSkeleton().GetPrim(),
                     self.report,
                     jointed=jointed,
                     rigid=jointed and bool(query.IsRigidlyDeformed()),

@@ -105,12 +105,32 @@ def _decompose(matrix: npt.NDArray[np.float64] | None) -> TRS:
     return TRS((t[0], t[1], t[2]), (i[0], i[1], i[2], q.GetReal()), (s[0], s[1], s[2]))
 
 
-def aim(direction: tuple[float, float, float]) -> Gf.Quatd | None:
-    """The rotation that turns -Z into ``direction``; None when it is -Z already."""
+def aim(
+    direction: tuple[float, float, float], right: tuple[float, float, float] | None = None
+) -> Gf.Quatd | None:
+    """The rotation that turns -Z into ``direction``; None when it is -Z already.
+
+    ``right``: where +X goes, as nearly as it can; without it, or along ``direction``, by
+    the shortest turn.
+    """
     target = Gf.Vec3d(*direction)
+    side = None if right is None else _square_to(Gf.Vec3d(*right), target)
+    if side is not None:
+        back = -target.GetNormalized()
+        turn = Gf.Matrix3d(*side, *Gf.Cross(back, side), *back)
+        return turn.ExtractRotation().GetQuat()
     if target.GetLength() == 0.0 or Gf.IsClose(target.GetNormalized(), Gf.Vec3d(0, 0, -1), 1e-12):
         return None
     return Gf.Rotation(Gf.Vec3d(0, 0, -1), target).GetQuat()
+
+
+def _square_to(vector: Gf.Vec3d, axis: Gf.Vec3d) -> Gf.Vec3d | None:
+    """The part of a vector across an axis, unit length; None where there is none."""
+    if vector.GetLength() == 0.0 or axis.GetLength() == 0.0:
+        return None
+    vector, axis = vector.GetNormalized(), axis.GetNormalized()
+    across = vector - axis * Gf.Dot(vector, axis)
+    return across.GetNormalized() if across.GetLength() > 1e-6 else None
 
 
 def uniform_scale(world: Gf.Matrix4d) -> tuple[float, bool]:

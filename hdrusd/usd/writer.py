@@ -240,8 +240,14 @@ class StageWriter:
             spec.specifier = Sdf.SpecifierDef
             spec.typeName = "Material"
 
-    def write_light(self, place: Place, source: legacy.Light, light: PhotometricLight) -> Usd.Prim:
-        """A light at its node, into the photometry layer."""
+    def write_light(
+        self,
+        place: Place,
+        source: legacy.Light,
+        light: PhotometricLight,
+        right: tuple[float, float, float] | None = None,
+    ) -> Usd.Prim:
+        """A light at its node, into the photometry layer; ``right``: where its +X points, C = 0."""
         self._edit("photometry")
         path = self.names.child(place.path, source.name)
         node = UsdGeom.Xformable(self.stage.GetPrimAtPath(place.path))
@@ -252,7 +258,7 @@ class StageWriter:
             scale = 1.0
         prim = write_light(self.stage, path, light, scale=scale * self.meters_per_unit)
         self._display_name(prim, source.name)
-        self._place_light(prim, source, world, even)
+        self._place_light(prim, source, world, even, right)
         write_legacy_falloff(prim, source.range, source.attenuation)
         keep_extras(prim, source.extras)
         prim.SetCustomDataByKey(
@@ -267,14 +273,19 @@ class StageWriter:
         return prim
 
     def _place_light(
-        self, prim: Usd.Prim, source: legacy.Light, world: Gf.Matrix4d, even: bool
+        self,
+        prim: Usd.Prim,
+        source: legacy.Light,
+        world: Gf.Matrix4d,
+        even: bool,
+        right: tuple[float, float, float] | None,
     ) -> None:
         """Position and aim below the node; a skewed space above is undone, once."""
         form = UsdGeom.Xformable(prim)
+        turn = aim(source.direction, right)
         if not even:
             # A lamp is not squeezed by its node's scale: own space = rigid part of the node's.
             local = Gf.Matrix4d(1.0)
-            turn = aim(source.direction)
             if turn is not None:
                 local.SetRotateOnly(turn)
             local.SetTranslateOnly(Gf.Vec3d(*source.position))
@@ -287,7 +298,6 @@ class StageWriter:
             return
         if any(source.position):
             form.AddTranslateOp().Set(Gf.Vec3d(*source.position))
-        turn = aim(source.direction)
         if turn is not None and source.kind != "ambient":
             form.AddOrientOp(UsdGeom.XformOp.PrecisionDouble).Set(Gf.Quatd(turn))
 

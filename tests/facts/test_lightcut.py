@@ -18,6 +18,11 @@ Array = Any
 EYE = np.array([1000.0, -2000.0, 30.0])
 
 
+def at(*offset: Any) -> Array:
+    """A place relative to the eye, or several."""
+    return EYE + np.array(offset)
+
+
 def table_of(tree: LightTree, lights: Array) -> Array:
     return np.concatenate([lights, merged_lights(tree, lights)])
 
@@ -154,7 +159,7 @@ def test_the_bound_of_one_node_is_no_better_and_not_much_worse_than_the_truth(be
 def test_the_bound_holds_for_surfaces_whose_horizon_runs_between_the_lamps() -> None:
     rng = np.random.default_rng(5)
     lights = lamps(rng, 64, spread=6.0)
-    centre = EYE + (40.0, 0.0, 0.0)
+    centre = at(40.0, 0.0, 0.0)
     tree = build_tree(lights)
     whole = table_of(tree, lights)
     for epsilon in (0.02, 0.1, 0.5):
@@ -172,7 +177,7 @@ def test_colours_are_bounded_one_by_one() -> None:
     lights["intensity"] = rng.uniform(0, 1000, (120, 3)) * (rng.uniform(size=(120, 3)) > 0.4)
     tree = build_tree(lights)
     whole = table_of(tree, lights)
-    centre = EYE + (0.0, 0.0, -20.0)
+    centre = at(0.0, 0.0, -20.0)
     for epsilon in (0.05, 0.5):
         _, row = cut(tree, EYE, tiles(centre, 1.0), epsilon)
         assert np.any(row >= 120)
@@ -187,7 +192,7 @@ def test_colours_are_bounded_one_by_one() -> None:
 def test_two_lamps_in_line_differ_by_the_remainder() -> None:
     # (a) is attained by lamps in one line with the place: 1/(r - u)^2 + 1/(r + u)^2 - 2/r^2.
     lights = lamps(np.random.default_rng(0), 2, intensity=1.0, radius=0.0)
-    lights["position"] = EYE + ((9.0, 0, 0), (11.0, 0, 0))
+    lights["position"] = at((9.0, 0, 0), (11.0, 0, 0))
     difference = 1 / 81 + 1 / 121 - 2 / 100
     # For the nearer half alone the remainder of its side is 1 / 81 - 1 / 100 - 2 / 1000.
     second = 2 * (3 - 0.2) / (100 * 81)
@@ -220,11 +225,11 @@ def test_every_light_is_there_once_for_each_tile() -> None:
 
 def test_a_merged_lamp_has_the_candela_of_its_lamps_at_their_centroid() -> None:
     lights = lamps(np.random.default_rng(0), 2)
-    lights["position"] = EYE + ((0.0, 0, 0), (4.0, 0, 0))
+    lights["position"] = at((0.0, 0, 0), (4.0, 0, 0))
     lights["intensity"] = ((300.0, 30.0, 3.0), (100.0, 10.0, 1.0))
     lights["radius"] = (0.1, 0.2)
     (merged,) = merged_lights(build_tree(lights), lights)
-    assert merged["position"] == pytest.approx(EYE + (1.0, 0, 0), rel=1e-12)
+    assert merged["position"] == pytest.approx(at(1.0, 0, 0), rel=1e-12)
     assert merged["intensity"] == pytest.approx((400.0, 40.0, 4.0), rel=1e-12)
     assert merged["radius"] == pytest.approx(0.2, rel=1e-7)  # float32 in the tree
     assert merged["key"] == -1
@@ -259,7 +264,7 @@ def test_what_is_not_alike_stays_alone() -> None:
 def test_moving_lights_keep_their_rows() -> None:
     lights = lamps(np.random.default_rng(4), 50)
     moving = np.arange(50) % 10 == 0
-    _, row = cut(build_tree(lights, np.where(moving, -1, 0)), EYE, tiles(EYE + (500.0, 0, 0), 1.0), 0.5)
+    _, row = cut(build_tree(lights, np.where(moving, -1, 0)), EYE, tiles(at(500.0, 0, 0), 1.0), 0.5)
     assert set(np.flatnonzero(moving)) <= set(row)
     assert len(row) < 10
 
@@ -268,7 +273,7 @@ def test_zero_epsilon_merges_only_what_stands_in_one_place() -> None:
     lights = lamps(np.random.default_rng(8), 40)
     lights["position"][20:] = lights["position"][20]
     tree = build_tree(lights)
-    _, row = cut(tree, EYE, tiles(EYE + (0, 0, 90.0), 5.0), 0.0)
+    _, row = cut(tree, EYE, tiles(at(0, 0, 90.0), 5.0), 0.0)
     assert set(range(20)) <= set(row)
     assert len(row) < 25
     merged = table_of(tree, lights)[row[row >= 40]]
@@ -284,8 +289,8 @@ def test_a_tile_around_its_lamps_has_them_all() -> None:
 def test_narrow_lobes_keep_lamps_apart() -> None:
     # Two lamps 2 m apart across the way, 50 m ahead of a place 10 m below the eye's axis.
     lights = lamps(np.random.default_rng(1), 2, intensity=100.0)
-    lights["position"] = EYE + ((60.0, -1.0, 0), (60.0, 1.0, 0))
-    place = EYE + (10.0, 0.0, -1.0)
+    lights["position"] = at((60.0, -1.0, 0), (60.0, 1.0, 0))
+    place = at(10.0, 0.0, -1.0)
     tree = build_tree(lights)
     to_lamp = lights["position"].mean(axis=0) - place
     to_eye = EYE - place
@@ -328,7 +333,7 @@ def test_few_lights_and_no_tiles(count: int) -> None:
     lights = lamps(np.random.default_rng(0), count)
     tree = build_tree(lights)
     assert len(merged_lights(tree, lights)) == max(count - 1, 0)
-    tile, row = cut(tree, EYE, tiles(EYE + (9.0, 0, 0), 1.0), 0.0)
+    _, row = cut(tree, EYE, tiles(at(9.0, 0, 0), 1.0), 0.0)
     assert sorted(row) == list(range(count))
     none = Tiles(*(k[:0] for k in (np.zeros((1, 3)), np.zeros(1), np.zeros(1), np.zeros((1, 3)))))
     assert all(len(k) == 0 for k in cut(tree, EYE, none))

@@ -10,7 +10,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.gpu.hdr import HdrRenderer
+from hdrusd.gpu.hdr import HdrRenderer, Options
 from hdrusd.gpu.peeling import Peeling
 from hdrusd.gpu.program import Programs
 from hdrusd.gpu.surfaces import SurfacePass
@@ -156,7 +156,9 @@ def render(
 ) -> Rendered:
     """One frame of 64 x 48 pixels by shader 1."""
     # Without shadows, unless asked for: the pixels are what the formulas say of them alone.
-    renderer = HdrRenderer(gl, Programs(gl), (WIDTH, HEIGHT), load, **{"shadows": False, **options})
+    renderer = HdrRenderer(
+        gl, Programs(gl), (WIDTH, HEIGHT), load, Options(**{"shadows": False, **options})
+    )
     renderer.render(scene)
     normal, diffuse, specular, hdr = (
         renderer.layer(name).astype(np.float64)

@@ -282,10 +282,12 @@ def test_nearer_surface_hides_the_farther(gl: Any) -> None:
 def test_new_version_of_a_geometry_is_shown(gl: Any) -> None:
     from small_scenes import HEIGHT, WIDTH
 
-    from hdrusd.gpu.hdr import HdrRenderer
+    from hdrusd.gpu.hdr import HdrRenderer, Options
     from hdrusd.gpu.program import Programs
 
-    renderer = HdrRenderer(gl, Programs(gl), (WIDTH, HEIGHT), lambda _: None, shadows=False)
+    renderer = HdrRenderer(
+        gl, Programs(gl), (WIDTH, HEIGHT), lambda _: None, Options(shadows=False)
+    )
     first = lit_quad()
     renderer.render(first)
     seen = renderer.read().any(axis=-1).sum()

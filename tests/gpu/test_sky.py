@@ -57,7 +57,7 @@ def scene(**fields: Any) -> RenderScene:
 
 def smooth(height: int = 32) -> Any:
     """A picture without sharp edges: each channel by its own direction."""
-    return (1.2 + texel_directions(height, 2 * height) @ np.linalg.qr(rng.normal(size=(3, 3)))[0])
+    return 1.2 + texel_directions(height, 2 * height) @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
 
 
 def empty() -> Any:
@@ -75,9 +75,7 @@ def test_the_background_shows_the_texel_of_each_direction(gl: Any, eye: Any) -> 
     dome = sky(visible=True, factor=(2.0, 3.0, 4.0), rotation=tuple(rotation.ravel()))
     view = camera(eye=eye)
     buffer = GBuffer(gl, **surfaces(*empty()))
-    sky_pass(gl, sky=texels).draw_background(
-        scene(skies=(dome,), camera=view), buffer.frame, SIZE
-    )
+    sky_pass(gl, sky=texels).draw_background(scene(skies=(dome,), camera=view), buffer.frame, SIZE)
     uv = sky_uv(directions(view) @ rotation.T)
     place = np.stack([(1.0 - uv[..., 1]) * 4, uv[..., 0] * 8], axis=-1)
     # Not within two of the 64 texels of an edge between colours, where they are filtered.
@@ -139,9 +137,7 @@ def between(picture: Any, x: Any, y: Any, columns: Any) -> Any:
     i, j = np.floor(x).astype(int), np.floor(y).astype(int)
     rows = [np.clip(k, 0, picture.shape[0] - 1) for k in (j, j + 1)]
     s, t = (x - i)[..., None], (y - j)[..., None]
-    low, high = (
-        picture[r, columns(i)] * (1 - s) + picture[r, columns(i + 1)] * s for r in rows
-    )
+    low, high = (picture[r, columns(i)] * (1 - s) + picture[r, columns(i + 1)] * s for r in rows)
     return low * (1 - t) + high * t
 
 

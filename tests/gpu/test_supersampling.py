@@ -5,13 +5,12 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 import pytest
+from small_scenes import quad
 
-from hdrusd.gpu.hdr import HdrRenderer
+from hdrusd.gpu.hdr import HdrRenderer, Options
 from hdrusd.gpu.program import Programs
 from hdrusd.gpu.supersampling import offsets
 from hdrusd.scene import Camera, Draw, Material, RenderScene
-
-from small_scenes import quad
 
 
 @pytest.mark.parametrize("samples", [1, 2, 3, 4, 7, 8, 16, 64])
@@ -32,7 +31,7 @@ def test_an_edge_shows_the_share_that_it_covers(gl: moderngl.Context) -> None:
         materials=(Material(diffuse=(0.0, 0.0, 0.0), emission=(100.0, 100.0, 100.0)),),
         camera=Camera(window=(-1.0, 1.0, -1.0, 1.0), near=0.1, far=10.0),
     )
-    renderer = HdrRenderer(gl, Programs(gl), (8, 8), lambda _: None, samples=64)
+    renderer = HdrRenderer(gl, Programs(gl), (8, 8), lambda _: None, Options(samples=64))
     renderer.render(scene)
     row = renderer.read()[4, :, 0]
     np.testing.assert_allclose(row, [100.0] * 3 + [25.0] + [0.0] * 4, rtol=1e-6)

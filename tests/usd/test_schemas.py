@@ -20,7 +20,6 @@ CONTRACT = {
     "HdrusdPhotometricLightAPI": {
         "inputs:photometric:luminousIntensity": ("float", False, "cd"),
         "inputs:photometric:illuminance": ("float", False, "lx"),
-        "inputs:photometric:file": ("asset", False, None),
         "photometric:provenance": ("token", True, None),
         "photometric:rule": ("string", True, None),
         "photometric:source": ("string", True, None),

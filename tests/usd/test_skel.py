@@ -251,3 +251,38 @@ def test_a_skinned_cage_is_refined_after_it_is_bent() -> None:
     assert len(geometries[1].points) == 2 * 4 * 2 * 3
     near = np.abs(geometries[1].points - [1, 0, -0.5]).max(axis=1)
     assert near.min() < 1e-6
+
+
+def test_copies_and_instances_of_a_skinned_mesh_bend_too() -> None:
+    """Below a point instancer, and as native instances of one SkelRoot."""
+    arm = Arm(place=(0, 10, 0))
+    copies = UsdGeom.PointInstancer.Define(arm.stage, "/Copies")
+    copies.CreatePositionsAttr([Gf.Vec3f(0, 0, 100)])
+    copies.CreateProtoIndicesAttr([0])
+    copies.CreatePrototypesRel().SetTargets(["/Root"])
+    for name in ("One", "Two"):
+        prim = arm.stage.DefinePrim(f"/{name}")
+        prim.GetReferences().AddInternalReference("/Root")
+        prim.SetInstanceable(True)
+        UsdGeom.Xformable(prim).AddTranslateOp().Set(Gf.Vec3d(0, 0, 200 if name == "One" else 300))
+    scene = StageReader(arm.stage, Report()).read(1.0, Camera())
+    hands = []
+    for draw in scene.draws:
+        assert draw.moving
+        for matrix in draw.transforms:
+            hands.append((draw.geometry.points[7] @ matrix[:3, :3] + matrix[3, :3]).tolist())
+    assert sorted(hand[2] for hand in hands) == pytest.approx([-1, 99, 199, 299], abs=1e-5)
+    assert [hand[1] for hand in hands] == pytest.approx([10.0] * 4, abs=1e-5)
+
+
+def test_a_shape_without_points_follows_one_joint() -> None:
+    arm = Arm(None)
+    ball = UsdGeom.Cube.Define(arm.stage, "/Root/Ball")
+    binding = UsdSkel.BindingAPI.Apply(ball.GetPrim())
+    binding.CreateSkeletonRel().SetTargets(["/Root/Skel"])
+    binding.CreateJointIndicesPrimvar(True, 1).Set([1])
+    binding.CreateJointWeightsPrimvar(True, 1).Set([1.0])
+    binding.CreateGeomBindTransformAttr(Gf.Matrix4d().SetTranslate(Gf.Vec3d(2, 0, 0)))
+    draws = StageReader(arm.stage, Report()).read(1.0, Camera()).draws
+    (cube,) = (draw for draw in draws if draw.moving)
+    assert cube.transforms[0, 3, :3] == pytest.approx([1, 0, -1], abs=1e-6)

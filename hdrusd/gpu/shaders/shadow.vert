@@ -1,6 +1,7 @@
 // Casters into the tiles of the shadow atlas that see them: an instance is a tile.
-// ROW texels a tile: four columns of its matrix to clip space; middle x, y and half width in the
+// A row of texels a tile: four columns of its matrix to clip space; middle x, y and half width in the
 // atlas' clip space, tangent; x, y, z of its eye from the lamp in its frame, lamp's radius^2.
+// Both tables are 2^TABLE texels wide: division takes a software device longer than all else here.
 #define ROW 6
 #ifdef TILES
 uniform float fill;  // depth in clip space
@@ -18,14 +19,14 @@ uniform float aspect;      // width of the atlas by its height
 
 vec4 texel(int row, int k)
 {
-    int at = row * ROW + k, width = textureSize(tiles, 0).x;
-    return texelFetch(tiles, ivec2(at % width, at / width), 0);
+    int at = row * ROW + k;
+    return texelFetch(tiles, ivec2(at & ((1 << TABLE) - 1), at >> TABLE), 0);
 }
 
 void main()
 {
-    int at = first + gl_InstanceID, width = textureSize(pairs, 0).x;
-    int row = texelFetch(pairs, ivec2(at % width, at / width), 0).r;
+    int at = first + gl_InstanceID;
+    int row = texelFetch(pairs, ivec2(at & ((1 << TABLE) - 1), at >> TABLE), 0).r;
     vec4 area = texel(row, 4);
 #ifdef TILES
     // The tile itself, as a strip of two triangles.
