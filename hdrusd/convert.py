@@ -16,9 +16,10 @@ from hdrusd.errors import InputError, SourceRef, ValidationError
 from hdrusd.importers.importer import Limits, Resolver
 from hdrusd.importers.importer import read as read_legacy
 from hdrusd.legacy import scene as legacy
+from hdrusd.luminaires import LuminaireFiles
 from hdrusd.maps import MapWriter
 from hdrusd.photometry.estimate import DEFAULT_RULE, RULES
-from hdrusd.photometry.interpret import Interpreter, luminance, rule_color
+from hdrusd.photometry.interpret import Interpreter, LuminaireFile, luminance, rule_color
 from hdrusd.photometry.light import PhotometricLight, chromaticity
 from hdrusd.photometry.sidecar import FILE_NAME, Rule, Sidecar, read_sidecar
 from hdrusd.report import Kind, Report
@@ -26,6 +27,7 @@ from hdrusd.surfaces import SurfaceMaker, colored_materials, material_rows
 from hdrusd.usd.material import write_look, write_photometric
 from hdrusd.usd.mesh import COLOR_PRIMVAR
 from hdrusd.usd.settings import Settings
+from hdrusd.usd.transform import across
 from hdrusd.usd.writer import Place, StageWriter
 from hdrusd.validation import validate
 
@@ -144,6 +146,23 @@ def _move_into_place(folder: Path, output: Path) -> None:
         raise
 
 
+@dataclass(frozen=True, slots=True)
+class _Lamp:
+    """A light of the source, ready to be written."""
+
+    place: Place
+    source: legacy.Light
+    light: PhotometricLight
+    right: legacy.Vec3 | None = None  # where C = 0 of its photometric file points
+    flux: float | None = None  # lm of its photometric file
+
+    def row(self, path: str) -> dict[str, Any]:
+        """The account of it for the report."""
+        row = _light_row(self.source.name, path, self.light, self.source)
+        row["place"] = str(self.place.node.source)
+        return row if self.flux is None else row | {"unit": "times the file", "flux_lm": self.flux}
+
+
 class _Conversion:
     """One run: the pieces that several steps need."""
 
@@ -158,7 +177,12 @@ class _Conversion:
         resolver = Resolver(source, report, options.roots, options.search, options.limits)
         self.scene = read_legacy(resolver, report)
         stem = output.stem
-        self.maps = MapWriter(folder / f"{stem}.textures", f"./{stem}.textures", report)
+        files = folder / f"{stem}.textures", f"./{stem}.textures"
+        self.maps = MapWriter(*files, report)
+        named = Resolver(
+            self.sidecar.path or source, report, options.roots, options.search, options.limits
+        )
+        self.luminaires = LuminaireFiles(*files, named, report)
         self.writer = StageWriter(
             folder,
             stem,
@@ -193,7 +217,7 @@ class _Conversion:
         )
         self.sidecar.note_unmatched(self.report)
         self.writer.save()
-        self.result.textures = self.maps.written
+        self.result.textures = self.maps.written | self.luminaires.written
         self._validate()
         return self.result
 
@@ -205,7 +229,8 @@ class _Conversion:
         maker = SurfaceMaker(
             self.maps, self.interpreter, self.sidecar, self.options.gamma, self.report
         )
-        surfaces = [maker.surface(m, colored=i in colored) for i, m in enumerate(materials)]
+        glossed = [maker.glossed(material) for material in materials]
+        surfaces = [maker.surface(m, colored=i in colored) for i, m in enumerate(glossed)]
 
         def look(stage: Usd.Stage, index: int, path: Sdf.Path) -> None:
             maps = maker.look(materials[index])
@@ -214,7 +239,7 @@ class _Conversion:
             )
 
         def photometric(stage: Usd.Stage, index: int, path: Sdf.Path) -> None:
-            write_photometric(stage, path, materials[index], surfaces[index])
+            write_photometric(stage, path, glossed[index], surfaces[index])
 
         self.writer.edit_materials("look", look)
         self.writer.edit_materials("photometry", photometric)
@@ -224,7 +249,7 @@ class _Conversion:
 
     def _write_lights(self) -> None:
         ambients: list[PhotometricLight] = []
-        interpreted: list[tuple[Place, int, PhotometricLight]] = []
+        lamps: list[_Lamp] = []
         for place in self.writer.places:
             for index in place.node.lights:
                 light = self.scene.lights[index]
@@ -235,20 +260,45 @@ class _Conversion:
                         Kind.REPLACED, "ambient-replaced", light.source, light.name, text
                     )
                     continue
-                meaning = self.interpreter.light(light, rule)
+                file = self._luminaire(light, rule)
+                meaning = self.interpreter.light(light, rule, file)
                 if meaning is not None and meaning.kind == "ambient":
                     ambients.append(meaning)
                 elif meaning is not None:
-                    interpreted.append((place, index, meaning))
-        for place, index, lamp in interpreted:
-            source = self.scene.lights[index]
-            prim = self.writer.write_light(place, source, lamp)
-            row = _light_row(source.name, str(prim.GetPath()), lamp, source, str(place.node.source))
-            self.result.lights.append(row)
+                    lamp = _Lamp(place, light, meaning)
+                    if rule is not None and file is not None:
+                        lamp = self._aimed(lamp, rule, file)
+                    lamps.append(lamp)
+        for lamp in lamps:
+            prim = self.writer.write_light(lamp.place, lamp.source, lamp.light, lamp.right)
+            self.result.lights.append(lamp.row(str(prim.GetPath())))
         ambient = self._ambient(ambients)
         if ambient is not None:
             path = self.writer.write_ambient(ambient).GetPath()
-            self.result.lights.append(_light_row("Sky", str(path), ambient, None, ""))
+            self.result.lights.append(_light_row("Sky", str(path), ambient, None))
+
+    def _luminaire(self, light: legacy.Light, rule: Rule | None) -> LuminaireFile | None:
+        """The photometric file that a rule gives to a light with a place."""
+        if rule is None or "ies" not in rule.values or light.kind not in ("point", "spot"):
+            return None
+        return self.luminaires.use(str(rule.values["ies"]), rule.place)
+
+    def _aimed(self, lamp: _Lamp, rule: Rule, file: LuminaireFile) -> _Lamp:
+        """The lamp with its luminaire's axis and C = 0 where the rule has them."""
+
+        def note(kind: Kind, text: str) -> None:
+            self.report.add(kind, "profile-aim", rule.place, lamp.source.name, text)
+
+        axis, right = rule.three("axis"), rule.three("c0")
+        if axis is None and lamp.source.kind == "point":
+            note(Kind.ASSUMED, "gamma = 0 points along the light's -Z; axis says otherwise")
+        source = replace(lamp.source, direction=axis or lamp.source.direction)
+        if right is None and not file.symmetric:
+            note(Kind.ASSUMED, "C = 0 points as the shortest turn leaves +X; c0 says otherwise")
+        elif right is not None and across(right, source.direction) is None:
+            note(Kind.INVALID, "c0 lies along the axis; not used")
+        flux = lamp.light.intensity * file.luminaire.flux()
+        return replace(lamp, source=source, right=right, flux=flux)
 
     def _ambient(self, from_lights: list[PhotometricLight]) -> PhotometricLight | None:
         """The photometry file's sky, else the sum of what the source calls ambient."""
@@ -339,7 +389,7 @@ def _temperature_rgb(kelvin: float) -> legacy.RGB:
 
 
 def _light_row(
-    name: str, path: str, light: PhotometricLight, source: legacy.Light | None, place: str
+    name: str, path: str, light: PhotometricLight, source: legacy.Light | None
 ) -> dict[str, Any]:
     unit = "cd" if light.kind in ("point", "spot") else "lx"
     legacy_value: dict[str, Any] | None = None
@@ -352,7 +402,7 @@ def _light_row(
     return {
         "name": name,
         "path": path,
-        "place": place,
+        "place": "",
         "kind": light.kind,
         "value": light.intensity,
         "unit": unit,
@@ -360,5 +410,6 @@ def _light_row(
         "provenance": light.provenance,
         "rule": light.rule,
         "source_value": legacy_value,
+        "file": light.profile or None,
         "flux_lm": light.intensity * 4.0 * math.pi if light.kind == "point" else None,
     }

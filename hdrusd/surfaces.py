@@ -14,6 +14,10 @@ from hdrusd.report import Kind, Report
 from hdrusd.units import TEXTURE_GAMMA
 from hdrusd.usd.material import Map, Surface
 from hdrusd.usd.mesh import COLOR_PRIMVAR
+from hdrusd.usd.preview import roughness_from_shininess
+
+#: Keys of a photometry rule that say how a surface reflects.
+_REFLECTION = frozenset({"diffuse", "gamma", "specular", "roughness", "shininess"})
 
 #: TexEnv modes in which the texture covers the material's colour.
 _COVERING = ("REPLACE", "DECAL")
@@ -47,8 +51,37 @@ class SurfaceMaker:
         opacity = self._opacity(material)
         return maps if opacity is None else maps | {"opacity": opacity}
 
+    def glossed(self, material: Material) -> Material:
+        """The material with the highlight that the photometry file states.
+
+        A stated roughness is that of a GGX lobe, a stated shininess Blinn and Phong's. A
+        material of metallic and roughness stays with GGX; a stated specular reflectance
+        takes the place of its metallic.
+        """
+        rule = self.sidecar.match("material", material.name)
+        if rule is None:
+            return material
+        specular = rule.three("specular")
+        roughness, shininess = rule.number("roughness"), rule.number("shininess")
+        if material.pbr is None and roughness is None:
+            shininess = material.shininess if shininess is None else shininess
+            return replace(material, specular=specular or material.specular, shininess=shininess)
+        if roughness is None and shininess is not None:
+            roughness = roughness_from_shininess(shininess)
+        pbr = dict(material.pbr or {"glossiness": 0.0})
+        if specular is not None and "glossiness" not in pbr:
+            pbr = {"glossiness": 1.0 - pbr.get("roughness", 1.0)}
+        if roughness is not None and "glossiness" in pbr:
+            pbr["glossiness"] = 1.0 - roughness
+        elif roughness is not None:
+            pbr["roughness"] = roughness
+        return replace(material, specular=specular or material.specular, pbr=pbr)
+
     def surface(self, material: Material, *, colored: bool) -> Surface:
-        """The material in photometric terms. ``colored``: worn by meshes with vertex colours."""
+        """A material of ``glossed`` in photometric terms.
+
+        ``colored``: worn by meshes with vertex colours.
+        """
         rule = self.sidecar.match("material", material.name)
         gamma = self._gamma(rule)
         diffuse = (rule and rule.three("diffuse")) or material.diffuse
@@ -70,6 +103,8 @@ class SurfaceMaker:
         if not lamp:
             self._note_differences(material, diffuse, specular, colored=colored)
         bright = any(emission)
+        if rule is not None and not bright and _REFLECTION & rule.values.keys():
+            provenance, name, source = rule.provenance, str(rule.place), rule.source
         return Surface(
             diffuse=diffuse,
             gamma=gamma,
@@ -82,7 +117,7 @@ class SurfaceMaker:
             replaces_reflection=lamp,
             opacity_map=self._opacity(material),
             vertex_color=COLOR_PRIMVAR if colored else "",
-            provenance=provenance if bright else "",
+            provenance=provenance if bright or name else "",
             rule=name,
             source=source,
         )
@@ -165,6 +200,7 @@ def material_rows(
             "path": str(path),
             "gamma": surface.gamma,
             "diffuse": list(surface.diffuse),
+            "specular": list(surface.specular),
             "reflectance_map": surface.diffuse_map.file if surface.diffuse_map else None,
             "luminance_cd_m2": surface.luminance,
             "provenance": surface.provenance or None,

@@ -20,14 +20,7 @@ from pxr import Gf, Usd, UsdGeom, UsdShade, UsdValidation
 from hdrusd.colour import luminance
 from hdrusd.errors import SchemaRegistrationError
 from hdrusd.schemas import register
-from hdrusd.usd.lux import (
-    connection_end,
-    input_source,
-    is_light,
-    light_kind,
-    photometric_file,
-    read_lux,
-)
+from hdrusd.usd import lux
 
 register()
 
@@ -173,14 +166,14 @@ _AREA_KINDS = frozenset({"sphere", "disk", "rect", "cylinder"})
 @_task
 def check_light(prim: Usd.Prim, span: UsdValidation.ValidationTimeRange) -> Iterator[_Fault]:
     """A light's numbers are sound, and say the same in UsdLux and in photometric units."""
-    sources = {name: input_source(prim, name) for name in _LIGHT_NUMBERS}
+    sources = {name: lux.input_source(prim, name) for name in _LIGHT_NUMBERS}
     broken = [
         fault
         for name, allowed in _LIGHT_NUMBERS.items()
         for fault in _bad_numbers(sources[name], f"inputs:{name}", span, allowed)
     ]
     yield from broken
-    kind = light_kind(prim)
+    kind = lux.light_kind(prim)
     if kind in _AREA_KINDS:
         yield from _ambiguous_size(prim, kind)
     wrong = "illuminance" if kind in _AREA_KINDS else "luminousIntensity"
@@ -190,7 +183,7 @@ def check_light(prim: Usd.Prim, span: UsdValidation.ValidationTimeRange) -> Iter
             "WrongQuantity",
             f"inputs:photometric:{wrong} has no meaning on a {kind} light; want {right}",
         )
-    if kind in _AREA_KINDS and photometric_file(prim):
+    if kind in _AREA_KINDS and lux.photometric_file(prim):
         if _authored(prim, "inputs:photometric:luminousIntensity"):
             text = "luminousIntensity beside a photometric file, whose candela count; want one"
             yield _Fault("CandelaAndFile", text, warning=True)
@@ -201,7 +194,7 @@ def check_light(prim: Usd.Prim, span: UsdValidation.ValidationTimeRange) -> Iter
 def _ambiguous_size(prim: Usd.Prim, kind: str) -> Iterator[_Fault]:
     """Where renderers may read the size of a light in different ways."""
     unit = UsdGeom.GetStageMetersPerUnit(prim.GetStage())
-    normalize = input_source(prim, "normalize").Get(Usd.TimeCode.EarliestTime())
+    normalize = lux.input_source(prim, "normalize").Get(Usd.TimeCode.EarliestTime())
     if normalize is True and unit != 1.0:
         yield _Fault(
             "NormalizedArea",
@@ -227,9 +220,9 @@ def _disagreement(prim: Usd.Prim, placed: bool, times: list[Usd.TimeCode]) -> It
     name, unit = ("luminousIntensity", "cd") if placed else ("illuminance", "lx")
     if not _authored(prim, f"inputs:photometric:{name}"):
         return
-    source = input_source(prim, f"photometric:{name}")
+    source = lux.input_source(prim, f"photometric:{name}")
     for time in times:
-        said, reading = source.Get(time), read_lux(prim, time)
+        said, reading = source.Get(time), lux.read_lux(prim, time)
         if said is None or reading is None:
             continue
         plain = luminance(reading.intensity)
@@ -259,13 +252,13 @@ def check_material(prim: Usd.Prim, span: UsdValidation.ValidationTimeRange) -> I
     surface = _preview_surface(prim)
     if surface is not None:
         for name in ("diffuseColor", "specularColor"):
-            source = input_source(surface, name)
+            source = lux.input_source(surface, name)
             yield from _bad_numbers(source, f"inputs:{name}", span, _REFLECTANCE)
-        emissive = input_source(surface, "emissiveColor")
+        emissive = lux.input_source(surface, "emissiveColor")
         faults += _bad_numbers(emissive, "inputs:emissiveColor", span, _NOT_NEGATIVE)
         texture = _emissive_texture(surface)
         if texture is not None:
-            scale = input_source(texture, "scale")
+            scale = lux.input_source(texture, "scale")
             faults += _bad_numbers(scale, f"{texture.GetName()}.inputs:scale", span, _NOT_NEGATIVE)
         if not faults and luminance and luminance.HasAuthoredValue():
             yield from _emission_disagreement(surface, texture, luminance, span)
@@ -276,7 +269,7 @@ def _preview_surface(prim: Usd.Prim) -> Usd.Prim | None:
     output = UsdShade.Material(prim).GetSurfaceOutput()
     if not output:
         return None
-    shader = UsdShade.Shader(connection_end(output.GetAttr()).GetPrim())
+    shader = UsdShade.Shader(lux.connection_end(output.GetAttr()).GetPrim())
     if not shader or shader.GetIdAttr().Get() != "UsdPreviewSurface":
         return None
     return shader.GetPrim()
@@ -285,7 +278,7 @@ def _preview_surface(prim: Usd.Prim) -> Usd.Prim | None:
 def _emissive_node(surface: Usd.Prim) -> Usd.Prim | None:
     """The node whose output is the emission, None where the surface states the colour."""
     own = surface.GetAttribute("inputs:emissiveColor")
-    end = connection_end(own) if own else None
+    end = lux.connection_end(own) if own else None
     return end.GetPrim() if end and UsdShade.Output.IsOutput(end) else None
 
 
@@ -309,13 +302,13 @@ def _emission_disagreement(
     if texture is None:
         if _emissive_node(surface) is not None:
             return  # another node; nothing here says what its 1 is
-        name, emissive = "emissiveColor", input_source(surface, "emissiveColor")
+        name, emissive = "emissiveColor", lux.input_source(surface, "emissiveColor")
         unauthored = (0.0, 0.0, 0.0)  # UsdPreviewSurface's default
     else:
-        bias = input_source(texture, "bias")
+        bias = lux.input_source(texture, "bias")
         if bias and bias.Get(Usd.TimeCode.EarliestTime()) not in (None, Gf.Vec4f(0.0)):
             return  # 1 is not what stands for the luminance
-        name, emissive = f"{texture.GetName()}.inputs:scale", input_source(texture, "scale")
+        name, emissive = f"{texture.GetName()}.inputs:scale", lux.input_source(texture, "scale")
         unauthored = (1.0, 1.0, 1.0)  # UsdUVTexture's default
     for time in _times([emissive, stated], span):
         said = stated.Get(time)
@@ -335,11 +328,11 @@ def _emission_disagreement(
 @_task
 def check_ambient(prim: Usd.Prim, span: UsdValidation.ValidationTimeRange) -> Iterator[_Fault]:
     """The ambient term is sound, and its dome light says the same."""
-    lux = prim.GetAttribute("photometric:ambient:illuminance")
+    stated = prim.GetAttribute("photometric:ambient:illuminance")
     tint = prim.GetAttribute("photometric:ambient:color")
     faults = [
         fault
-        for source in (lux, tint)
+        for source in (stated, tint)
         for fault in _bad_numbers(source, source.GetName(), span, _NOT_NEGATIVE)
     ]
     yield from faults
@@ -347,7 +340,7 @@ def check_ambient(prim: Usd.Prim, span: UsdValidation.ValidationTimeRange) -> It
     if faults or not targets:
         return
     dome = prim.GetStage().GetPrimAtPath(targets[0])
-    if len(targets) > 1 or not is_light(dome) or light_kind(dome) != "dome":
+    if len(targets) > 1 or not lux.is_light(dome) or lux.light_kind(dome) != "dome":
         found = ", ".join(str(path) for path in targets)
         yield _Fault("NoDome", f"photometric:ambient:light is {found}; want one dome light")
         return
@@ -359,25 +352,25 @@ def check_ambient(prim: Usd.Prim, span: UsdValidation.ValidationTimeRange) -> It
         )
         return
     names = ("intensity", "exposure", "color", "enableColorTemperature", "colorTemperature")
-    for time in _times([lux, tint, *(input_source(dome, name) for name in names)], span):
-        fault = _ambient_disagreement(lux.Get(time), tint.Get(time), dome, time)
+    for time in _times([stated, tint, *(lux.input_source(dome, name) for name in names)], span):
+        fault = _ambient_disagreement(stated.Get(time), tint.Get(time), dome, time)
         if fault is not None:
             yield fault
             return
 
 
 def _ambient_disagreement(
-    lux: float | None, tint: Gf.Vec3f | None, dome: Usd.Prim, time: Usd.TimeCode
+    stated: float | None, tint: Gf.Vec3f | None, dome: Usd.Prim, time: Usd.TimeCode
 ) -> _Fault | None:
     """Channel by channel, relative to the illuminance."""
     color = (1.0, 1.0, 1.0) if tint is None else tuple(tint)
     if not math.isclose(luminance(color), 1.0, rel_tol=AGREEMENT):
         text = f"photometric:ambient:color has a luminance of {luminance(color):.6g}; want 1"
         return _Fault("ColorLuminance", text)
-    reading = read_lux(dome, time)
+    reading = lux.read_lux(dome, time)
     if reading is None:
         return None
-    said = np.multiply(lux or 0.0, color)
+    said = np.multiply(stated or 0.0, color)
     difference = np.abs(said - reading.intensity).max()
     if difference <= AGREEMENT * max(luminance(said), luminance(reading.intensity)):
         return None
@@ -427,7 +420,7 @@ def _times(
 
 def _authored(prim: Usd.Prim, name: str) -> bool:
     attribute = prim.GetAttribute(name)
-    return bool(attribute) and bool(connection_end(attribute).HasAuthoredValue())
+    return bool(attribute) and bool(lux.connection_end(attribute).HasAuthoredValue())
 
 
 def _channels(numbers: Any) -> str:

@@ -130,26 +130,6 @@ def distant_view(
     )
 
 
-def ball_view(
-    direction: Doubles, middle: Doubles, radius: float, eye: Doubles, bounds: Doubles
-) -> DistantView:
-    """One tile that holds a ball, for light from ``direction`` (3,), a unit vector towards it.
-
-    ``middle``, ``eye`` (3,), ``bounds`` (2, 3): m from the casters' origin.
-    """
-    frame = _frame(-direction)
-    halves = np.array([radius * (_STEPS / (_STEPS - 2.0))])
-    return DistantView(
-        kind="SHADOW_ORTHO",
-        frame=frame,
-        centres=_snapped(middle[None] @ frame[:2].T, halves),
-        halves=halves,
-        depths=_depths(frame[2], bounds),
-        shears=np.zeros((1, 2)),
-        eye=eye,
-    )
-
-
 def _frame(axis: Doubles) -> Doubles:
     """(3, 3) rows u, v, a: orthonormal, a = ``axis``."""
     u = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])

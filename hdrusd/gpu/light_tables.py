@@ -53,6 +53,15 @@ class Extras:
             self.profile[which],
         )
 
+    def followed_by(self, count: int) -> Extras:
+        """The same with ``count`` lights more that have none."""
+        return Extras(
+            np.pad(self.shadow_kind, (0, count), constant_values=""),
+            np.pad(self.shadow, ((0, count), (0, 0), (0, 0))),
+            np.pad(self.profile_kind, (0, count), constant_values=""),
+            np.pad(self.profile, ((0, count), (0, 0), (0, 0))),
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LightClass:

@@ -21,6 +21,8 @@ from hdrusd.gpu.batches import Draws, Lists, batches
 from hdrusd.gpu.light_tables import Extras, LightClass, light_classes
 from hdrusd.gpu.program import Programs
 from hdrusd.gpu.surfaces import set_used
+from hdrusd.gpu.tiles import LightLists, TileList, tile_balls
+from hdrusd.photometry.lighttree import has_beam
 from hdrusd.scene import Camera, Material, RenderScene
 
 Ints = npt.NDArray[np.int32]
@@ -29,6 +31,12 @@ Bind = Callable[[moderngl.Program, Sequence[str]], None]
 
 #: Side of a tile, pixels.
 TILE = 32
+
+#: Lights above which far ones are merged in the mode "auto".
+MANY = 64
+
+#: Lamps with a beam from which on it pays to ask which tiles they reach.
+FEW = 4
 
 #: Texels a row of the tables that vertices read; every device has as many.
 _WIDTH = 2048
@@ -71,11 +79,12 @@ class LightPass:
         self.programs = programs
         self.size = size
         self.scale = scale
+        self._lists = LightLists()
         self._grid = (-(-size[0] // TILE), -(-size[1] // TILE))
         self._bounds = ctx.texture(self._grid, 4, dtype="f4")
         self._bounds_frame = ctx.framebuffer([self._bounds])
         self._areas = ctx.buffer(reserve=1 << 16, dynamic=True)
-        self._lists = ctx.buffer(reserve=1 << 16, dynamic=True)
+        self._list_buffer = ctx.buffer(reserve=1 << 16, dynamic=True)
         self._vaos: dict[moderngl.Program, moderngl.VertexArray] = {}
 
     def add(
@@ -91,10 +100,12 @@ class LightPass:
         ``layers``: the G-buffer by the names of its samplers. ``bind``: sets what the
         extras need in a program with these #defines.
         """
-        classes = light_classes(scene.lights, scene.camera, extras)
-        if not classes:
+        merge = self._may_merge(scene.lights, extras)
+        table = _Table(self.ctx, self._lists.update(scene.lights, merge), scene.camera, extras)
+        if not table.classes:
             return
         bounds = self.tile_bounds(layers, any(shines(m) for m in scene.materials))
+        regions = self._regions(table, bounds, scene.camera)
         ctx = self.ctx
         frame.use()
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
@@ -110,15 +121,51 @@ class LightPass:
         uniforms |= window_uniforms(scene.camera)
         for unit, layer in enumerate(layers.values()):
             layer.use(unit)
-        table = _Table(ctx, classes)
-        for gloss, names in _GLOSS.items():
-            areas = runs(np.where(bounds.far > 0.0, bounds.gloss, -1) == gloss, self.size)
-            if len(areas):
-                coated = ("COATED",) if "g_extra" in layers and 2 & gloss else ()
-                self._add_classes(table, areas, (*names, *coated), uniforms, bind)
-        table.release()
+        table.texture.use(TABLE_UNIT)
+        for region in regions:
+            coated = ("COATED",) if "g_extra" in layers and 2 & region.gloss else ()
+            self._add_classes(table, region, (*_GLOSS[region.gloss], *coated), uniforms, bind)
+        table.texture.release()
         frame.depth_mask = True
         ctx.enable_only(moderngl.NOTHING)
+
+    def merges(self, lights: npt.NDArray[np.void]) -> bool:
+        """Whether far lamps of these are taken together."""
+        return self.mode == "merged" or (self.mode == "auto" and len(lights) > MANY)
+
+    def _may_merge(
+        self, lights: npt.NDArray[np.void], extras: Extras | None
+    ) -> npt.NDArray[np.bool_]:
+        if not self.merges(lights):
+            return np.zeros(len(lights), np.bool_)
+        if extras is None:
+            return np.ones(len(lights), np.bool_)
+        return np.asarray((extras.shadow_kind == "") & (extras.profile_kind == ""))
+
+    def _regions(self, table: _Table, bounds: TileBounds, camera: Camera) -> list[_Region]:
+        """The screen by highlights, and which lights reach what part of it."""
+        seen = bounds.far > 0.0
+        if table.merged or table.beams >= FEW:
+            row, column = np.nonzero(seen)
+            corners = np.stack([column, row, column + 1, row + 1], axis=1) * TILE
+            areas = np.minimum(corners, [*self.size, *self.size]).astype(np.int32)
+            gloss = bounds.gloss[seen]
+            lobe = np.where(gloss > 0, bounds.lobe[seen], np.inf).astype(np.float32)
+            tiles = tile_balls(areas, bounds.near[seen], bounds.far[seen], lobe, self.size, camera)
+            found = self._lists.lists(table.kinds, tiles, camera.eye)
+            return [
+                _Region(
+                    int(kind),
+                    areas[gloss == kind],
+                    {k: table.of_tiles(each, gloss == kind) for k, each in found.items()},
+                )
+                for kind in np.unique(gloss)
+            ]
+        regions = []
+        for kind in np.unique(bounds.gloss[seen]):
+            areas = runs(seen & (bounds.gloss == kind), self.size)
+            regions.append(_Region(int(kind), areas, table.everywhere(len(areas))))
+        return regions
 
     def tile_bounds(self, layers: Mapping[str, moderngl.Texture], glossy: bool) -> TileBounds:
         """Reduce the G-buffer to its tiles and read that."""
@@ -138,20 +185,25 @@ class LightPass:
     def _add_classes(
         self,
         table: _Table,
-        areas: Ints,
+        region: _Region,
         names: Sequence[str],
         uniforms: Mapping[str, Any],
         bind: Bind | None,
     ) -> None:
-        """All lights on ``areas``, whose surfaces have one kind of highlight."""
-        for kind, coned in table.pairs():
-            lists = Lists.same(table.starts(kind), len(areas))
-            coned_lists = Lists.same(table.starts(coned), len(areas))
+        """All lights on a region, whose surfaces have one kind of highlight."""
+        nothing = Lists.same(np.zeros(0, np.int32), len(region.areas))
+        for first, second in table.pairs():
+            kind = None if first is None else table.classes[first]
+            coned = None if second is None else table.classes[second]
+            lists = nothing if first is None else region.lists.get(first, nothing)
+            coned_lists = nothing if second is None else region.lists.get(second, nothing)
             order = np.concatenate([lists.order, coned_lists.order])
+            if not len(order):
+                continue
             texture = _texture(self.ctx, order, "i4")
             texture.use(ORDER_UNIT)
-            dark = (table.dark(kind), table.dark(coned))
             rows = kind.rows if kind is not None else 2
+            own = {**uniforms, "dark": (table.dark(first), table.dark(second))}
             for draws in batches(
                 lists,
                 kind.batches if kind is not None else (1,),
@@ -160,11 +212,11 @@ class LightPass:
                 coned.batches if coned is not None else (1,),
             ):
                 program = self._program(kind, rows, draws.sizes, names)
-                for name, value in {**uniforms, "dark": dark}.items():
+                for name, value in own.items():
                     set_used(program, name, value)
                 if bind is not None and kind is not None:
                     bind(program, kind.defines)
-                self._draw(program, areas, draws)
+                self._draw(program, region.areas, draws)
             texture.release()
 
     def _program(
@@ -185,48 +237,81 @@ class LightPass:
         return self.programs.get("gpu/shaders/light.vert", "gpu/shaders/light.frag", defines)
 
     def _draw(self, program: moderngl.Program, areas: Ints, draws: Draws) -> None:
-        for buffer, data in ((self._areas, areas[draws.rectangles]), (self._lists, draws.lists)):
+        for buffer, data in (
+            (self._areas, areas[draws.rectangles]),
+            (self._list_buffer, draws.lists),
+        ):
             if buffer.size < data.nbytes:
                 buffer.orphan(2 * data.nbytes)
             buffer.write(np.ascontiguousarray(data, np.int32))
         if program not in self._vaos:
-            content = [(self._areas, "4i /i", "in_area"), (self._lists, "4i /i", "in_list")]
+            content = [(self._areas, "4i /i", "in_area"), (self._list_buffer, "4i /i", "in_list")]
             self._vaos[program] = self.ctx.vertex_array(program, content)
         instances = len(draws.rectangles)
         self._vaos[program].render(moderngl.TRIANGLE_STRIP, vertices=4, instances=instances)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Region:
+    """Rectangles of the screen with one kind of highlight, and their lights by class."""
+
+    gloss: int
+    areas: Ints  # (k, 4)
+    lists: dict[int, Lists]
+
+
 class _Table:
-    """The texels of all classes one after the other, in a texture."""
+    """The texels of all classes one after the other, in a texture.
 
-    def __init__(self, ctx: moderngl.Context, classes: Sequence[LightClass]) -> None:
-        self.classes = classes
-        sizes = [len(kind.texels) * kind.rows for kind in classes]
-        self._first = dict(zip(map(id, classes), np.cumsum([0, *sizes[:-1]]).tolist(), strict=True))
-        texels = np.concatenate([kind.texels.reshape(-1, 4) for kind in classes])
-        self._texture = _texture(ctx, texels, "f4")
-        self._texture.use(TABLE_UNIT)
+    ``lights``: those of the scene, to which ``extras`` belongs, and then merged ones.
+    """
 
-    def release(self) -> None:
-        self._texture.release()
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        lights: npt.NDArray[np.void],
+        camera: Camera,
+        extras: Extras | None,
+    ) -> None:
+        count = 0 if extras is None else len(extras.shadow_kind)
+        self.merged = extras is not None and len(lights) > count
+        more = None if extras is None else extras.followed_by(len(lights) - count)
+        self.classes = light_classes(lights, camera, more)
+        self.kinds = np.full(len(lights), -1, np.int32)
+        self._starts = np.zeros(len(lights), np.int32)
+        self._dark = []
+        begin = 0
+        for number, kind in enumerate(self.classes):
+            self.kinds[kind.members] = number
+            self._starts[kind.members] = begin + np.arange(len(kind.members)) * kind.rows
+            begin += len(kind.texels) * kind.rows
+            self._dark.append(begin - kind.rows)
+        self.beams = int(np.count_nonzero(has_beam(lights[self.kinds >= 0])))
+        if self.classes:
+            texels = np.concatenate([kind.texels.reshape(-1, 4) for kind in self.classes])
+            self.texture = _texture(ctx, texels, "f4")
 
-    def starts(self, kind: LightClass | None) -> Ints:
-        """(n,) where each light of a class begins."""
-        if kind is None:
-            return np.zeros(0, np.int32)
-        count = np.arange(len(kind.members), dtype=np.int32)
-        return np.asarray(self._first[id(kind)] + count * kind.rows, np.int32)
+    def dark(self, number: int | None) -> int:
+        """Where the light of a class begins that is not there."""
+        return 0 if number is None else self._dark[number]
 
-    def dark(self, kind: LightClass | None) -> int:
-        """Where the light begins that is not there."""
-        return 0 if kind is None else self._first[id(kind)] + len(kind.members) * kind.rows
+    def everywhere(self, rectangles: int) -> dict[int, Lists]:
+        """Every light for every rectangle."""
+        return {
+            number: Lists.same(self._starts[kind.members], rectangles)
+            for number, kind in enumerate(self.classes)
+        }
 
-    def pairs(self) -> list[tuple[LightClass | None, LightClass | None]]:
+    def of_tiles(self, found: TileList, chosen: npt.NDArray[np.bool_]) -> Lists:
+        """The lists of some of the tiles."""
+        return Lists(self._starts[found.rows], found.first[chosen], found.count[chosen])
+
+    def pairs(self) -> list[tuple[int | None, int | None]]:
         """What is drawn together: lamps without and with a cone, each other class alone."""
-        named = {kind.defines: kind for kind in self.classes}
+        named = {kind.defines: number for number, kind in enumerate(self.classes)}
         simple = named.pop(_PLAIN, None), named.pop(_CONES, None)
-        rest = [(kind, None) for kind in named.values()]
-        return [simple, *rest] if any(simple) else [*rest]
+        rest: list[tuple[int | None, int | None]] = [(number, None) for number in named.values()]
+        return rest if simple == (None, None) else [simple, *rest]
 
 
 def shines(material: Material) -> bool:

@@ -36,17 +36,16 @@ _UNIFORM = {"normal": "bump"}
 
 @dataclass(frozen=True, slots=True)
 class MaterialInputs:
-    """``defines`` of the variant, ``uniforms``, ``images`` by texture unit."""
+    """``defines`` of the variant, ``uniforms``, ``images`` by texture unit.
+
+    ``layout``: what its geometry must bring, texture coordinate sets and primvar of colour.
+    """
 
     material: Material
     defines: dict[str, Define]
     uniforms: dict[str, bytes]
     images: tuple[moderngl.Texture, ...]
-
-    @property
-    def layout(self) -> tuple[tuple[str, ...], str]:
-        """What its geometry must bring: texture coordinate sets, primvar of colour."""
-        return tuple(self.material.uv_sets()), self.material.vertex_color
+    layout: tuple[tuple[str, ...], str]
 
 
 @dataclass(slots=True)
@@ -110,7 +109,8 @@ def material_inputs(material: Material, textures: TextureCache) -> MaterialInput
         matrices = np.array(fetches.matrices)
         uniforms["image_u"], uniforms["image_v"] = floats(matrices[:, 0]), floats(matrices[:, 1])
         uniforms["images"] = np.arange(len(fetches.images), dtype=np.int32).tobytes()
-    return MaterialInputs(material, defines, uniforms, tuple(fetches.images))
+    layout = tuple(sets), material.vertex_color
+    return MaterialInputs(material, defines, uniforms, tuple(fetches.images), layout)
 
 
 def _fetch(fetches: _Fetches, use: TextureUse, textures: TextureCache, uv_set: int) -> int | None:

@@ -93,21 +93,16 @@ class _Target:
 
 
 class TileDrawing:
-    """The atlas on the GPU: what is shown and, where something moves, what stands still."""
+    """The atlas on the GPU: what is shown; and, of tiles that need it, what stands still."""
 
     def __init__(self, ctx: moderngl.Context, programs: Programs) -> None:
         self.ctx = ctx
         self.programs = programs
         self.size = (0, 0)
         self._shown: _Target | None = None
-        self._still: _Target | None = None
+        self._kept: _Target | None = None
         self._blank: _Target | None = None
         self._squares: dict[moderngl.Program, moderngl.VertexArray] = {}
-
-    @property
-    def twice(self) -> bool:
-        """Whether what stands still is kept apart."""
-        return self._still is not None
 
     def use(self, unit: int) -> None:
         """Bind the atlas; one lit texel where there is none."""
@@ -119,28 +114,32 @@ class TileDrawing:
             target = self._blank
         target.texture.use(unit)
 
-    def resize(self, size: tuple[int, int], *, moving: bool) -> bool:
+    def resize(self, size: tuple[int, int]) -> bool:
         """Make room; True where what was drawn is lost."""
-        if size == self.size and (self._still is not None or not moving):
+        if size == self.size:
             return False
-        for old in (self._shown, self._still):
+        for old in (self._shown, self._kept):
             if old is not None:
                 old.release()
-        self.size = size
-        self._shown = self._target(size)
-        self._still = self._target(size) if moving else None
-        if self._still is not None:
-            self._still.texture.compare_func = ""
+        self.size, self._shown, self._kept = size, self._target(size), None
         return True
 
-    def draw_still(self, tiles: Tiles, groups: Sequence[Group]) -> None:
-        """Tiles anew, with what stands still."""
-        self._draw(self._still or self._shown, tiles, groups, "TILES")
+    def draw(self, tiles: Tiles, groups: Sequence[Group]) -> None:
+        """Tiles anew."""
+        if self._shown is not None:
+            self._draw(self._shown, tiles, groups, {})
 
-    def draw_moving(self, tiles: Tiles, groups: Sequence[Group]) -> None:
-        """Tiles as they are without what moves, and that."""
-        if self._still is not None:
-            self._draw(self._shown, tiles, groups, "RESTORE")
+    def keep(self, tiles: Tiles, groups: Sequence[Group]) -> None:
+        """For ``redraw``: tiles with what stands still."""
+        if self._kept is None:
+            self._kept = self._target(self.size)
+            self._kept.texture.compare_func = ""
+        self._draw(self._kept, tiles, groups, {})
+
+    def redraw(self, tiles: Tiles, groups: Sequence[Group]) -> None:
+        """Tiles as they were kept, and what moves."""
+        if self._shown is not None:
+            self._draw(self._shown, tiles, groups, {"RESTORE": 1})
 
     def _target(self, size: tuple[int, int]) -> _Target:
         texture = self.ctx.depth_texture(size)
@@ -151,13 +150,11 @@ class TileDrawing:
 
     def _draw(
         self,
-        target: _Target | None,
+        target: _Target,
         tiles: Tiles,
         groups: Sequence[Group],
-        start: str,
+        start: dict[str, int],
     ) -> None:
-        if target is None or len(tiles) == 0:
-            return
         ctx = self.ctx
         target.framebuffer.use()
         ctx.enable_only(moderngl.DEPTH_TEST)
@@ -185,18 +182,16 @@ class TileDrawing:
         # A bound framebuffer must not be the one that ``resize`` releases.
         ctx.extra["framebuffer"].use()
 
-    def _start(self, count: int, start: str) -> None:
-        """Each tile filled: with the far plane, or with what stands still."""
+    def _start(self, count: int, start: dict[str, int]) -> None:
+        """Each tile filled: with the far plane, or with what was kept."""
         program = self.programs.get(
             "gpu/shaders/shadow.vert",
             "gpu/shaders/shadow.frag",
-            {"TABLE": TABLE, "TILES": 1} | ({"RESTORE": 1} if start == "RESTORE" else {}),
+            {"TABLE": TABLE, "TILES": 1} | start,
         )
         self._uniforms(program, 0)
-        set_used(program, "fill", 1.0)
-        if start == "RESTORE":
-            assert self._still is not None
-            self._still.texture.use(2)
+        if "RESTORE" in start and self._kept is not None:
+            self._kept.texture.use(2)
             set_used(program, "kept", 2)
         if program not in self._squares:
             self._squares[program] = self.ctx.vertex_array(program, [])

@@ -32,7 +32,7 @@ SAMPLE_ROWS = 4
 #: Slot of a face that has no tile: nothing there casts.
 NO_TILE = 7
 
-#: Sines of the angle from axis +X, -X, +Y, ... to the u, v and a of its cube face (rows).
+#: u, v and a (rows: right, up, ahead) of the cube faces +X, -X, +Y, -Y, +Z, -Z.
 CUBE = np.array(
     [
         [[0, 1, 0], [0, 0, 1], [1, 0, 0]],

@@ -7,7 +7,8 @@ tile that sees a moving caster is restored from it and only what moves is drawn.
 
 Error: edges of shadows are right to one texel of the tile, softened over one; the light of
 an area source is seen in steps of 1 / samples, softened likewise. A shadow begins within
-about two texels of where its caster touches the receiver.
+about two texels, plus what 24 bits of depth leave open (1.8e-7 distance^2 / near), of where
+its caster touches the receiver.
 """
 
 from __future__ import annotations
@@ -73,7 +74,9 @@ class _Lamp:
     outlines: Tiles  # those of ``full``, at their widest
     place: tuple[Block, int, int] | None = None
     tiles: Tiles | None = None
+    moves: bool = False  # it was elsewhere in the frame before
     drawn: bool = False
+    kept: bool = False  # what stands still is kept apart too
     saw: npt.NDArray[np.bool_] | None = None  # (t,) tiles that showed something that moves
     sees: npt.NDArray[np.bool_] | None = None  # (t,) of ``full``: those that do now
 
@@ -159,6 +162,9 @@ class ShadowMaps:
         self._rounding = float(np.max(np.abs(bounds))) * 2.0**-22
         lamps = self._current(scene, np.flatnonzero(wanted), bounds)
         self._look(lamps)
+        keys = {int(lights["key"][i]) for i in lamps}
+        for key in self._lamps.keys() - keys:
+            del self._lamps[key]
         lamps = {i: lamp for i, lamp in lamps.items() if lamp.faces.any()}
         sizes = self._sizes(scene, lamps)
         self._find_left_out(np.array([i for i in lamps if not sizes[i]], np.intp), len(lamps))
@@ -207,7 +213,8 @@ class ShadowMaps:
                 outlines = _tiles(full, int(light["shadow_link"]), block, 0, 0)
                 seen = _see(outlines, self.casters.still)
                 lamp = _Lamp(signature, full, _faces(full, seen), outlines)
-                lamp.place = old.place if old else None
+                if old is not None:
+                    lamp.place, lamp.moves = old.place, True
                 self._lamps[key] = lamp
             elif isinstance(old.full, DistantView):
                 old.full = full  # its data are relative to the eye
@@ -275,34 +282,45 @@ class ShadowMaps:
         size = smallest_atlas(Counter(blocks.values()), self._atlas.size, self.limit)
         if size != self._atlas.size:
             self._atlas = Atlas(*size)
-        lost = self._drawing.resize(size, moving=bool(self.casters.moving) or self._drawing.twice)
+        lost = self._drawing.resize(size)
         lost = not self._atlas.keep(blocks) or lost
         for key in self._lamps.keys() - blocks.keys():
-            del self._lamps[key]
+            self._lamps[key].place = None
         for key, (lamp, _) in wanted.items():
             place = self._atlas.places[key]
             if lost or place != lamp.place or not lamp.drawn:
-                lamp.place, lamp.drawn, lamp.saw = place, False, None
+                lamp.place, lamp.drawn = place, False
                 lamp.tiles = _tiles(lamp.view, int(lamp.outlines.links[0]), *place)
 
     def _draw(self, lamps: list[_Lamp]) -> None:
         """What has changed in the tiles."""
-        still: list[Tiles] = []
-        moving: list[Tiles] = []
+        anew: list[Tiles] = []
+        keep: list[Tiles] = []
+        again: list[Tiles] = []
         for lamp in lamps:
             assert lamp.tiles is not None
-            changed = np.full(len(lamp.tiles), not lamp.drawn)
-            if not lamp.drawn:
-                still.append(lamp.tiles)
-            sees = np.zeros_like(changed) if lamp.sees is None else lamp.of_view(lamp.sees)
-            changed |= sees if lamp.saw is None else sees | lamp.saw
-            if changed.any():
-                moving.append(lamp.tiles[changed])
+            sees = np.zeros(len(lamp.tiles), np.bool_)
+            if lamp.sees is not None:
+                sees = lamp.of_view(lamp.sees)
+            fresh = not lamp.drawn or lamp.saw is None
+            if fresh:
+                lamp.kept = False
+            changed = sees if lamp.saw is None else sees | lamp.saw
+            if fresh and (lamp.moves or not sees.any()):
+                # A light that moves is drawn anew each time: worth keeping are those that rest.
+                anew.append(lamp.tiles)
+            elif changed.any():
+                if not lamp.kept:
+                    keep.append(lamp.tiles)
+                    lamp.kept = True
+                again.append(lamp.tiles if fresh else lamp.tiles[changed])
             lamp.drawn, lamp.saw = True, sees
-        if still:
-            self._drawing.draw_still(join(still), self.casters.still)
-        if moving:
-            self._drawing.draw_moving(join(moving), self.casters.moving)
+        if anew:
+            self._drawing.draw(join(anew), [*self.casters.still, *self.casters.moving])
+        if keep:
+            self._drawing.keep(join(keep), self.casters.still)
+        if again:
+            self._drawing.redraw(join(again), self.casters.moving)
 
 
 def _faces(view: View | DistantView, seen: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
@@ -315,7 +333,11 @@ def _see(tiles: Tiles, groups: list[Group]) -> npt.NDArray[np.bool_]:
     """(t,) the tiles that see any caster of the groups."""
     seen = np.zeros(len(tiles), np.bool_)
     for group in groups:
-        seen |= seen_by(tiles, group).any(axis=1)
+        # So many tiles at a time that the flags of all boxes stay small.
+        some = max(20_000_000 // max(len(group.boxes), 1), 1)
+        for first in range(0, len(tiles), some):
+            block = slice(first, first + some)
+            seen[block] |= seen_by(tiles[block], group).any(axis=1)
     return seen
 
 

@@ -147,17 +147,20 @@ class SkyPass:
         layers: Mapping[str, moderngl.Texture],
         frame: moderngl.Framebuffer,
         scale: float,
+        arriving: moderngl.Texture | None = None,
     ) -> None:
         """What GGX surfaces mirror of skies and ambient light, into ``frame`` (blended).
 
         ``layers``: the G-buffer by the names of its samplers. ``scale``: 1/pi, or 1 for
-        ``petit2010``.
+        ``petit2010``. ``arriving``: what SkyOcclusion found to be left of the sky.
         """
         if not any(map(_mirrors, scene.materials)):
             return
         textures = {**layers, "reflected_table": self._reflected()}
         uniforms: dict[str, Any] = {"scale": scale * math.pi}
         defines = {"COATED": 1} if "g_extra" in layers else {}
+        if arriving is not None:
+            textures["arriving"], defines["OCCLUDED"] = arriving, 1
         if any(scene.ambient):
             uniforms["factor"] = tuple(lux / math.pi for lux in scene.ambient)
             program = self._program("gpu/shaders/sky.frag", defines)

@@ -109,7 +109,6 @@ class TextureCache:
         self.ctx = ctx
         self.load = load
         self.gamma = gamma
-        self.blank = ctx.texture((1, 1), 4, bytes(4))  # where there is no image
         self.anisotropy = 1.0 if describe(ctx)["software"] else min(ANISOTROPY, ctx.max_anisotropy)
         self._kept: dict[TextureRef, Uploaded | None] = {}
         self._holds: dict[TextureRef, int | None] = {}  # the one channel, or None for all

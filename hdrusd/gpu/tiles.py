@@ -100,21 +100,21 @@ class LightLists:
 
         ``merge`` (n,): which may be merged, if their kind allows: False for what has shadows
         or a shader of its own, for all of them where every light is to be counted alone.
-        A light that changes from one update to the next is not merged until it has been
-        ``STILL``: trees are built anew only when that set changes.
+        Few lights that change from one update to the next are not merged until they have
+        been ``STILL``: trees are built anew only when that set changes.
         """
-        if len(self._lights) != len(lights):
-            self._still = np.full(len(lights), STILL)
-            changed = np.ones(len(lights), np.bool_)
-        else:
+        changed = np.ones(len(lights), np.bool_)
+        if len(self._lights) == len(lights):
             changed = _bytes(lights) != _bytes(self._lights)
+        if 2 * np.count_nonzero(changed) > len(lights):  # another scene, not traffic
+            self._still = np.full(len(lights), STILL)
+        else:
             self._still = np.where(changed, 0, np.minimum(self._still + 1, STILL))
         chosen = np.flatnonzero(may_merge(lights) & merge & (self._still == STILL))
         same = np.array_equal(chosen, self._in_tree)
         if same and not np.any(changed):
             return self.table
-        # What is in the tree has stood still.
-        if not same or len(self._lights) != len(lights):
+        if not same or np.any(changed[chosen]):
             self._tree, self._in_tree = build_tree(lights[chosen]), chosen
         merged = merged_lights(self._tree, lights[chosen])
         self.table = np.concatenate([lights, merged])

@@ -92,7 +92,7 @@ def four_points(p: Array, n: Array, x: Array, y: Array) -> Array:
     total: Any = 0.0
     for offset in (x + y, x - y, y - x, -x - y):
         v = p + offset
-        total = total + np.maximum(dot(n, v), 0.0) / np.square(np.maximum(dot(v, v), 1e-20))
+        total = total + np.maximum(dot(n, v), 0.0) / np.square(np.maximum(dot(v, v), 1e-12))
     return np.asarray(0.25 * total)
 
 
@@ -228,7 +228,7 @@ def line_mean(p: Array, n: Array, x: Array) -> Array:
     along = x / half[..., None]
     middle = dot(p, along)
     across = p - middle[..., None] * along
-    square = np.maximum(dot(across, across), 1e-20)
+    square = np.maximum(dot(across, across), 1e-12)
     distance = np.sqrt(square)
     a, b = dot(n, across), dot(n, along)
     part = seen_part(a + b * (middle - half), a + b * (middle + half))
@@ -242,7 +242,7 @@ def line_mean(p: Array, n: Array, x: Array) -> Array:
     far: Any = 0.0
     for sign in (-1.0, 1.0):
         v = p + sign / np.sqrt(3.0) * x
-        far = far + 0.5 * np.maximum(dot(n, v), 0.0) / np.square(np.maximum(dot(v, v), 1e-20))
+        far = far + 0.5 * np.maximum(dot(n, v), 0.0) / np.square(np.maximum(dot(v, v), 1e-12))
     beyond = dot(p, p) > FAR * FAR * half * half
     return np.asarray(np.where(beyond, far, np.maximum(near, 0.0) / (2.0 * half)))
 
@@ -255,8 +255,9 @@ def cylinder_illuminance(p: Array, n: Array, x: Array, radius: Array) -> Array:
     cos(f0) = r / rho, and t = tan(f / 2), E = L r int (rho cos(f) - r) int cos / d^3, where
     rho cos(f) - r = (rho + r) (t0^2 - t^2) / (1 + t^2). Near to the surface the strips
     lie closer together where it is nearest: t = t0 s c / (1 - (1 - c) s^2), and c = ((rho^2 -
-    r^2) / (rho^2 - r^2 + 4 rho r))^(3/8) was found by trial. Nothing in front of the ends or
-    inside.
+    r^2) / (rho^2 - r^2 + 4 rho r))^(3/8) was found by trial. Error as a share of the
+    light, or of a fifth of what faces it: 1 % from 2 r on, 2 % at 1.5 r, 5 % at 1.1 r from the
+    axis. Nothing in front of the ends or inside.
     """
     half2 = np.maximum(dot(x, x), 1e-30)
     across = p - (dot(p, x) / half2)[..., None] * x

@@ -98,6 +98,22 @@ def read_ies(
     )
 
 
+def with_tilt(data: bytes, tilt_file: Callable[[str], bytes | None]) -> bytes:
+    """An LM-63 file that stands alone: what ``TILT=name`` names is put into its place.
+
+    LM-63 has the same lines behind ``TILT=INCLUDE``. As it was where there is no such file.
+    """
+    text = _text(data)
+    tilt = _TILT.search(text)
+    if tilt is None or tilt[1].strip().upper() in ("NONE", "INCLUDE"):
+        return data
+    included = tilt_file(tilt[1].strip())
+    if included is None or len(included) > MOST_BYTES:
+        return data
+    lines = _text(included).strip("\n")
+    return f"{text[: tilt.start()]}TILT=INCLUDE\n{lines}{text[tilt.end() :]}".encode("latin-1")
+
+
 def _header(text: str, place: SourceRef, report: Report) -> tuple[int, dict[str, str]]:
     """The edition by its label, and the keywords; [MORE] goes on with the last one."""
     lines = text.splitlines()

@@ -57,6 +57,12 @@ class LuminaireFile:
     name: str
     luminaire: Luminaire
 
+    @property
+    def symmetric(self) -> bool:
+        """Whether it gives the same in all planes, so that it may be turned about its axis."""
+        candela = self.luminaire.candela
+        return self.luminaire.type == "C" and bool((candela == candela[0]).all())
+
 
 @dataclass(frozen=True, slots=True)
 class Interpreter:

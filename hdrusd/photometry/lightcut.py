@@ -60,8 +60,9 @@ Bools = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.intp]
 
 #: Share of the light at a place by which merging may change it. The bound adds up what the
-#: worst place and normal of a tile would see of each node: measured errors are a tenth of it.
-EPSILON = 0.03
+#: worst place and normal of a tile would see of each node: the mean error that is found on
+#: streets is a tenth of it and less.
+EPSILON = 0.01
 
 #: How far (rms) merged lamps may turn the half vector, in widths of the narrowest lobe.
 LOBE_SHARE = 0.5

@@ -34,8 +34,11 @@ _ONE_PLACE = 1e-6
 
 _AXES = (0, 1, 2)
 
+#: Radius (m) up to which a ball is taken for a point.
+SMALL_BALL = 0.1
+
 #: What has to be the same for two lamps to merge, beside the beam.
-_SAME = ("link", "shadow", "shadow_link", "diffuse", "specular")
+_SAME = ("shape", "link", "shadow", "shadow_link", "diffuse", "specular")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,14 +73,16 @@ def may_merge(lights: Lights) -> Bools:
     """(n,) True for lights that have the field of a point lamp with cone and focus.
 
     Profiles, area lights and distant lights have another; a focus below 2 has a kink at
-    right angles to the axis, and less than no light follows no bound. What is too far away
-    or too bright for float32 stays alone too.
+    right angles to the axis, and less than no light follows no bound. A ball shines as the
+    point in its middle where no horizon cuts it: small ones may merge. What is too far
+    away or too bright for float32 stays alone too.
     """
     focus, outer = lights["exponent"], lights["outer"]
+    small_ball = (lights["shape"] == SPHERE) & (lights["radius"] <= SMALL_BALL)
     brightest = np.max(lights["intensity"], axis=1, initial=0.0)
     return np.asarray(
         (lights["w"] == 1.0)
-        & (lights["shape"] == POINT)
+        & ((lights["shape"] == POINT) | small_ball)
         & (lights["profile"] < 0)
         & ((focus == 0.0) | (focus >= 2.0))
         & ((outer <= np.pi) | (outer >= NO_CONE))

@@ -7,6 +7,8 @@ the Fresnel term of Schlick 1994. alpha is roughness squared. Twin of ``microfac
 What a layer reflects is lost to what lies below it: diffuse (1 - F), with F at V.H. The
 text of UsdPreviewSurface (2.6) leaves this open; its reference shader and glTF 2.0
 (appendix B) do so. A clear coat of 4 % (index 1.5) lies on the rest in the same way.
+Seen at a grazing angle a white and smooth surface so gives more than it gets: 7 % at 66
+degrees, 30 % at 78, for a reflectance of 1; below 0.5 it never does at these.
 
 Made for many lights a pixel: ``ggx_gain`` holds what does not depend on the light, and
 the lobe is a quotient without powers. sin^2 of the half angle takes the place of N.H,

@@ -24,7 +24,7 @@ from hdrusd.usd.bindings import Bindings
 from hdrusd.usd.camera import Conform, framing_camera, read_camera
 from hdrusd.usd.facing import facing
 from hdrusd.usd.gprims import GprimReader
-from hdrusd.usd.instanced_lights import instanced_rows, joined, light_key
+from hdrusd.usd.instanced_lights import instanced_rows, joined, light_key, moved_row
 from hdrusd.usd.instancer import Copies, Instancers
 from hdrusd.usd.light import light_time_varying, read_light_row
 from hdrusd.usd.lux import is_light
@@ -40,9 +40,11 @@ class Light:
     """One light prim and its row, kept unless it varies."""
 
     prim: Usd.Prim
-    varies: bool
+    varies: bool  # its inputs may change in time
+    moves: bool  # its place may
     hides: bool
     row: npt.NDArray[np.void] | None = None
+    place: npt.NDArray[np.float64] | None = None  # (4, 4) local to world where it was read
 
 
 @dataclass(slots=True)
@@ -204,8 +206,9 @@ class StageReader:
         if prim.IsA(UsdLux.DomeLight) or prim.IsA(UsdLux.DomeLight_1):
             plan.domes.append(prim)
         elif prim.IsA(UsdLux.NonboundableLightBase) or prim.IsA(UsdLux.BoundableLightBase):
-            varies = light_time_varying(prim) or place_varies(prim)
-            plan.lights.append(Light(prim, varies, hides(prim)))
+            plan.lights.append(
+                Light(prim, light_time_varying(prim), place_varies(prim), hides(prim))
+            )
         else:
             self._finding(
                 Kind.DROPPED, "light-unknown", f"{prim.GetTypeName()} light is not shown", prim
@@ -216,8 +219,13 @@ class StageReader:
     def _light(self, light: Light, cache: UsdGeom.XformCache) -> npt.NDArray[np.void] | None:
         if light.hides and not visible(light.prim, cache.GetTime()):
             return None
-        if light.row is None or light.varies:
+        if light.row is None or light.varies or light.moves:
             world = cache.GetLocalToWorldTransform(light.prim)
+            matrix = np.array(world, np.float64)
+            if light.row is not None and light.place is not None and not light.varies:
+                moved = moved_row(light.row, light.place, matrix, self.unit)
+                if moved is not None:
+                    return moved
             row = read_light_row(light.prim, cache.GetTime(), world, self.unit, self.report)
             if row is not None:
                 self.profiles.assign(light.prim, row, cache.GetTime())
@@ -227,7 +235,7 @@ class StageReader:
                 )
                 return None
             row["key"] = light_key(light.prim)
-            light.row = row
+            light.row, light.place = row, matrix
         return light.row
 
     def _instanced_lights(self, code: Usd.TimeCode) -> Iterator[npt.NDArray[np.void]]:

@@ -1,4 +1,4 @@
-"""Lamps in point instancers: read once, then moved to all their places at a time."""
+"""Lamps read once and moved: to all their places in point instancers, and along with cars."""
 
 from __future__ import annotations
 
@@ -38,18 +38,11 @@ def instanced_rows(
     one by one.
     """
     key = np.int64(light_key(copies.source)) + mixed(copies.ids)
-    first = copies.transforms[0, :3, :3]
-    solvable = abs(np.linalg.det(first)) > 1e-12 * np.abs(first).max() ** 3
     rows: list[Rows] = []
-    alone = np.ones(len(key), np.bool_)
-    if solvable:
-        # p' = p first turn: what is between the first copy's space and each one's.
-        turns = np.linalg.inv(first) @ copies.transforms[:, :3, :3]
-        gram = turns @ turns.transpose(0, 2, 1)
-        square = np.trace(gram, axis1=1, axis2=2) / 3.0
-        away = np.abs(gram - square[:, None, None] * np.eye(3)).max(axis=(1, 2))
-        alone = ~((away <= _SIMILAR * square) & (square > 0.0))
-        moved = _moved(copies, ~alone, turns, np.sqrt(square), time, meters_per_unit, report)
+    turns, scales = _turns(copies.transforms[0], copies.transforms)
+    alone = scales == 0.0
+    if not alone.all():
+        moved = _moved(copies, ~alone, turns, scales, time, meters_per_unit, report)
         if moved is None:
             return light_rows(0)
         moved["key"] = key[~alone]
@@ -60,6 +53,18 @@ def instanced_rows(
             row["key"] = key[index]
             rows.append(row)
     return joined(rows)
+
+
+def moved_row(row: Rows, before: Doubles, after: Doubles, meters_per_unit: float) -> Rows | None:
+    """The row of a lamp, read where it stood ``before``, for where it stands ``after``.
+
+    (4, 4) local to world each. None where not only its place and direction changed: it has
+    to be read again.
+    """
+    turns, scales = _turns(before, after[None])
+    if abs(scales[0] - 1.0) > _SIMILAR:
+        return None
+    return _placed(row, turns, np.ones(1), after[None, 3, :3] * meters_per_unit)
 
 
 def joined(rows: Sequence[Rows]) -> Rows:
@@ -86,19 +91,10 @@ def _moved(
     row = _read(copies.source, base, time, meters_per_unit, report)
     if row is None:
         return None
-    rows = np.repeat(row, int(chosen.sum()))
-    turns, scales = turns[chosen], scales[chosen]
-    for name in ("axis", "x", "y"):
-        rows[name] = np.einsum("j,kji->ki", row[name][0], turns)
-    units = ["axis"] if row["shape"][0] in (RECT, DISK, CYLINDER) else ["axis", "x", "y"]
-    for name in units:
-        rows[name] /= scales[:, None]
-    if row["w"][0] == 0.0:
-        rows["position"] = -rows["axis"]
-        return rows
-    rows["position"] = copies.transforms[chosen, 3, :3] * meters_per_unit
-    rows["radius"] *= scales
-    if np.abs(scales - 1.0).max(initial=0.0) > _SIMILAR:
+    scales = scales[chosen]
+    origins = copies.transforms[chosen, 3, :3] * meters_per_unit
+    rows = _placed(row, turns[chosen], scales, origins)
+    if row["w"][0] != 0.0 and np.abs(scales - 1.0).max(initial=0.0) > _SIMILAR:
         double = base.copy()
         double[:3, :3] *= 2.0
         larger = _read(copies.source, double, time, meters_per_unit, report)
@@ -107,6 +103,37 @@ def _moved(
         one, two = float(row["intensity"].max()), float(larger["intensity"].max())
         power = np.log2(two / one) if one > 0.0 and two > 0.0 else 0.0
         rows["intensity"] *= (scales**power)[:, None]
+    return rows
+
+
+def _turns(first: Doubles, others: Doubles) -> tuple[Doubles, Doubles]:
+    """What leads from the first matrix to each of the others, (k, 3, 3), p' = p first turn.
+
+    And the scale (k,) of each: 0 where it is not the same in all directions.
+    """
+    linear = first[:3, :3]
+    if not abs(np.linalg.det(linear)) > 1e-12 * np.abs(linear).max() ** 3:
+        return np.zeros((len(others), 3, 3)), np.zeros(len(others))
+    turns = np.linalg.inv(linear) @ others[:, :3, :3]
+    gram = turns @ turns.transpose(0, 2, 1)
+    square = np.trace(gram, axis1=1, axis2=2) / 3.0
+    away = np.abs(gram - square[:, None, None] * np.eye(3)).max(axis=(1, 2))
+    return turns, np.sqrt(np.where(away <= _SIMILAR * square, square, 0.0))
+
+
+def _placed(row: Rows, turns: Doubles, scales: Doubles, origins: Doubles) -> Rows:
+    """A row turned, scaled and placed k times; its strength stays."""
+    rows = np.repeat(row, len(scales))
+    for name in ("axis", "x", "y"):
+        rows[name] = np.einsum("j,kji->ki", row[name][0], turns)
+    units = ["axis"] if row["shape"][0] in (RECT, DISK, CYLINDER) else ["axis", "x", "y"]
+    for name in units:
+        rows[name] /= scales[:, None]
+    if row["w"][0] == 0.0:
+        rows["position"] = -rows["axis"]
+        return rows
+    rows["position"] = origins
+    rows["radius"] *= scales
     return rows
 
 

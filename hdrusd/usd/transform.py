@@ -114,7 +114,7 @@ def aim(
     the shortest turn.
     """
     target = Gf.Vec3d(*direction)
-    side = None if right is None else _square_to(Gf.Vec3d(*right), target)
+    side = None if right is None else across(right, direction)
     if side is not None:
         back = -target.GetNormalized()
         turn = Gf.Matrix3d(*side, *Gf.Cross(back, side), *back)
@@ -124,13 +124,13 @@ def aim(
     return Gf.Rotation(Gf.Vec3d(0, 0, -1), target).GetQuat()
 
 
-def _square_to(vector: Gf.Vec3d, axis: Gf.Vec3d) -> Gf.Vec3d | None:
-    """The part of a vector across an axis, unit length; None where there is none."""
-    if vector.GetLength() == 0.0 or axis.GetLength() == 0.0:
+def across(vector: tuple[float, float, float], axis: tuple[float, float, float]) -> Gf.Vec3d | None:
+    """The part of a vector across an axis, of length 1; None where there is none."""
+    if not any(vector) or not any(axis):
         return None
-    vector, axis = vector.GetNormalized(), axis.GetNormalized()
-    across = vector - axis * Gf.Dot(vector, axis)
-    return across.GetNormalized() if across.GetLength() > 1e-6 else None
+    way, pole = Gf.Vec3d(*vector).GetNormalized(), Gf.Vec3d(*axis).GetNormalized()
+    part = way - pole * Gf.Dot(way, pole)
+    return part.GetNormalized() if part.GetLength() > 1e-6 else None
 
 
 def uniform_scale(world: Gf.Matrix4d) -> tuple[float, bool]:

@@ -1,7 +1,7 @@
 """Makes the sample street: ``python samples/street/make_street.py OUTDIR``.
 
 Writes ``street.osgt``, ``street.gltf`` with ``street.bin`` and ``textures/*.png``,
-and copies ``photometry.toml`` beside them. The same bytes each time.
+and copies ``photometry.toml`` and its luminaires beside them. The same bytes each time.
 """
 
 from __future__ import annotations
@@ -17,6 +17,9 @@ from street_textures import write_textures
 from write_gltf import write_gltf
 from write_osgt import write_osgt
 
+#: The photometric files that photometry.toml names.
+LUMINAIRES = ("road_cutoff.ies", "shop_downlight.ldt")
+
 
 def main() -> None:
     """Make the street in the folder that the command line names."""
@@ -27,7 +30,11 @@ def main() -> None:
     root = street()
     write_osgt(root, out / "street.osgt")
     write_gltf(root, out / "street.gltf")
-    shutil.copyfile(Path(__file__).with_name("photometry.toml"), out / "photometry.toml")
+    here = Path(__file__).parent
+    shutil.copyfile(here / "photometry.toml", out / "photometry.toml")
+    (out / "luminaires").mkdir(exist_ok=True)
+    for file in LUMINAIRES:
+        shutil.copyfile(here / "luminaires" / file, out / "luminaires" / file)
     lights = sum(node.light is not None for node in instances(root))
     print(f"{out}: {count_triangles(root)} triangles, {lights} lights")
 

@@ -1,4 +1,4 @@
-"""What stands on the pavement: luminaires, arcade lanterns, signals, bollards, a poster column."""
+"""What stands or hangs on the pavement: lamps, signals, bollards, a poster column."""
 
 from __future__ import annotations
 
@@ -19,6 +19,9 @@ LANTERN_HEIGHT = 4.15  # m above the arcade's floor
 LUMINAIRE = Light(
     "LuminaireLamp", "spot", SODIUM, cutoff=75.0, exponent=2.0, attenuation=(0.5, 0.05, 0.01)
 )
+DOWNLIGHT_REACH, DOWNLIGHT_HEIGHT = 0.55, 3.22  # m from the wall, above the pavement
+
+DOWNLIGHT = Light("ShopLamp", "spot", WARM_WHITE, cutoff=70.0, exponent=6.0)
 LANTERN = Light(
     "ArcadeLamp", "spot", WARM_WHITE, cutoff=90.0, attenuation=(0.5, 0.1, 0.05)
 )  # its roof lets no light upwards
@@ -87,6 +90,16 @@ def lantern() -> Node:
     kit["Iron"].revolve(((0.0, -0.30), (0.11, -0.26), (0.11, -0.24)), 6)
     kit["Iron"].revolve(((0.20, 0.16), (0.22, 0.18), (0.10, 0.34), (0.03, 0.38), (0.015, 1.21)), 6)
     return Node("LanternModel", meshes=kit.meshes("LanternModel"))
+
+
+def downlight() -> Node:
+    """A can on an arm that reaches from a wall along -X; its origin is the glass."""
+    kit = Kit(MATERIALS)
+    iron = kit["Iron"]
+    iron.revolve(((0.05, -0.01), (0.065, -0.01), (0.065, 0.16), (0.03, 0.20), (0.0, 0.20)), 12)
+    iron.box((0.0, -0.012, 0.185), (DOWNLIGHT_REACH, 0.012, 0.21), "yYzZ")
+    kit["DownlightGlass"].box((-0.045, -0.045, 0.0), (0.045, 0.045, 0.01), "z")
+    return Node("DownlightModel", meshes=kit.meshes("DownlightModel"))
 
 
 def bollard() -> Node:

@@ -1,4 +1,4 @@
-"""Carriageway, markings, kerbs, pavements and the arcade's floor.
+"""Carriageway, markings, puddles, kerbs, pavements and the arcade's floor.
 
 Markings are cut out of the carriageway and lie in its plane: painted a little
 above it, they would flicker at a distance, where the depth buffer is coarse.
@@ -24,6 +24,10 @@ SIDE_STREET = 18.0  # m, width of the street across each end
 CROSSING = (92.0, 95.5)  # y of the zebra crossing
 STOP_LINES = ((90.0, 0.075, LANE), (97.0, -LANE, -0.075))  # y, from x, to x; 0.5 m wide
 DASH = 3.0  # m, dash and gap of the centre line
+WATER = 0.004  # m that a puddle stands above the road
+
+#: Strips where water stands, x from and to: the gutters, the wheel tracks of both lanes.
+_HOLLOWS = ((-5.42, -4.9), (-3.0, -2.1), (-1.3, -0.35), (0.35, 1.3), (2.1, 3.0), (4.9, 5.42))
 
 
 def _carriageway(kit: Kit) -> None:
@@ -47,6 +51,25 @@ def _carriageway(kit: Kit) -> None:
     kit["Marking"].cells(corners, paint)
 
 
+def _puddles(kit: Kit) -> None:
+    """Puddles between the markings, longer than wide, a fan of triangles each."""
+    rng = np.random.default_rng(400)
+    turn = np.linspace(0.0, 2.0 * np.pi, 25)
+    for low, high in _HOLLOWS:
+        y = rng.uniform(2.0, 8.0)
+        while y < LENGTH - 4.0:
+            half = rng.uniform(0.8, 2.6)  # m along the street
+            phase, waves = rng.uniform(0.0, 2.0 * np.pi, 3), np.array((2, 3, 5))
+            ragged = 1.0 + np.sin(waves[:, None] * turn + phase[:, None]).T @ (0.10, 0.08, 0.05)
+            x = (low + high) / 2.0 + ragged * np.cos(turn) * (high - low) / 2.46
+            points = np.stack((x, y + ragged * half * np.sin(turn), np.full(25, WATER)), axis=1)
+            middle = np.array(((low + high) / 2.0, y, WATER))
+            if not STOP_LINES[0][0] - 3.0 < y < STOP_LINES[1][0] + 3.5:
+                fan = (np.broadcast_to(middle, (24, 3)), points[:-1], points[1:])
+                kit["Puddle"].faces(np.stack(fan, axis=1))
+            y += 1.3 * half + rng.uniform(3.0, 12.0)
+
+
 def _flat(
     kit: Kit, material: str, x: tuple[float, float], y: tuple[float, float], z: float
 ) -> None:
@@ -61,6 +84,7 @@ def ground() -> Node:
     """Everything that is walked or driven on."""
     kit = Kit(MATERIALS)
     _carriageway(kit)
+    _puddles(kit)
     inner = KERB + 0.28
     section = np.array(((KERB, 0.0), (KERB, 0.10), (KERB + 0.03, FLOOR), (inner, FLOOR)))
     at = np.linspace(0.0, LENGTH, 21)

@@ -6,6 +6,9 @@ import numpy as np
 from street_buildings import FLOOR, Building, Storey, build
 from street_cars import ESTATE, HATCHBACK, SALOON, Design, bonnet, car, headlights
 from street_furniture import (
+    DOWNLIGHT,
+    DOWNLIGHT_HEIGHT,
+    DOWNLIGHT_REACH,
     LAMP_HEIGHT,
     LAMP_REACH,
     LANTERN,
@@ -13,6 +16,7 @@ from street_furniture import (
     LUMINAIRE,
     bollard,
     bollard_far,
+    downlight,
     lantern,
     luminaire,
     poster_column,
@@ -62,6 +66,10 @@ _PALACE = Building(
     "PalaceBuilding", 12, "StoneCream", "stone", (Storey(3.6, _TALL), *_rows(2, 3.2, _ARCHED)),
     "mansard", lit=0.28,
 )  # fmt: skip
+
+#: y of the shopfronts on the right that are lit from above: those of a bookseller, a hotel
+#: and a chemist, no awning before them.
+_SHOPS_LIT = (18.0, 22.0, 30.0, 34.0, 50.0, 54.0)
 
 #: Parked cars: y, design, paint. On the right they head +Y, on the left -Y.
 _PARKED_RIGHT: tuple[tuple[float, Design, str], ...] = (
@@ -135,6 +143,17 @@ def _lanterns() -> Node:
     return group
 
 
+def _downlights() -> Node:
+    """One before the middle of each shopfront."""
+    model, group = downlight(), Node("ShopDownlights")
+    for i, y in enumerate(_SHOPS_LIT):
+        name = f"ShopDownlight_{i + 1:02d}"
+        place = (FACADE_RIGHT - DOWNLIGHT_REACH, y, FLOOR + DOWNLIGHT_HEIGHT)
+        lamp = Node(f"{name}_Lamp", light=DOWNLIGHT)
+        group.children.append(Node(name, "pat", place, children=[model, lamp]))
+    return group
+
+
 def _furniture() -> Node:
     group = Node("Furniture")
     ends = (60.0, 2000.0)
@@ -195,11 +214,12 @@ def _traffic() -> list[Node]:
 
 def _views() -> list[Node]:
     """The cameras that stand still."""
-    overview = turn("x", 88.0)
+    overview, low = turn("x", 88.0), compose(turn("z", 1.5), turn("x", 91.0))
     arcade = compose(turn("z", -4.0), turn("x", 91.0))
     return [
         Node("Overview", "matrix", (0.8, 3.0, 6.0), overview, camera=Camera(50.0)),
         Node("ArcadeWalk", "matrix", (-11.2, 2.0, 1.75), arcade, camera=Camera(60.0)),
+        Node("WetRoad", "matrix", (0.3, 58.0, 0.45), low, camera=Camera(45.0)),
     ]
 
 
@@ -215,6 +235,7 @@ def street() -> Node:
             _buildings(),
             _luminaires(),
             _lanterns(),
+            _downlights(),
             _furniture(),
             _parked(),
             *_traffic(),

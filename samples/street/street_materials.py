@@ -36,6 +36,7 @@ _CAR_COLOURS: dict[str, Vec3] = {
 _ALL = [
     # ground
     Material("Asphalt", texture="asphalt.png", tile=7.0),
+    Material("Puddle", texture="asphalt.png", tile=7.0),  # by day as dry as the road
     Material("Marking", texture="marking.png", tile=1.5),
     Material("Kerb", texture="granite.png", tile=1.0),
     Material("Pavement", texture="pavement.png", tile=2.4),
@@ -75,6 +76,7 @@ _ALL = [
     _plain("PoleGreen", (0.05, 0.10, 0.08), 0.3, 30.0),
     _glowing("LampGlass", (0.60, 0.58, 0.50), (0.9, 0.75, 0.5)),
     _glowing("LanternGlass", (0.70, 0.68, 0.60), (0.9, 0.8, 0.6)),
+    _glowing("DownlightGlass", (0.70, 0.68, 0.60), (0.9, 0.8, 0.6)),
     _plain("SignalHousing", (0.03, 0.03, 0.03)),
     _plain("SignalRedOff", (0.20, 0.01, 0.01), 0.3, 40.0),
     _plain("SignalAmberOff", (0.22, 0.12, 0.01), 0.3, 40.0),

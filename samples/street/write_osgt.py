@@ -25,7 +25,7 @@ _CLASSES = {
 }
 
 #: The GL light that stands for each kind: the sun is 0, of the others any number may burn.
-_LIGHT_NUMBERS = {"SunLight": 0, "LuminaireLamp": 1, "ArcadeLamp": 2, "Headlamp": 3}
+_LIGHT_NUMBERS = {"SunLight": 0, "LuminaireLamp": 1, "ArcadeLamp": 2, "Headlamp": 3, "ShopLamp": 4}
 
 
 def _numbers(values: Iterable[float]) -> str:

@@ -12,7 +12,7 @@ from hdrusd.photometry import lightcut
 from hdrusd.photometry.light import cone_factor, focus_factor, inverse_edge
 from hdrusd.photometry.lightcut import EPSILON, LOBE_SHARE, Tiles, cut
 from hdrusd.photometry.lighttree import LightTree, build_tree, may_merge, merged_lights
-from hdrusd.scene import RECT, light_rows
+from hdrusd.scene import RECT, SPHERE, light_rows
 
 Array = Any
 EYE = np.array([1000.0, -2000.0, 30.0])
@@ -248,14 +248,22 @@ def test_what_is_not_alike_stays_alone() -> None:
         ("intensity", 0.0),
         ("position", np.nan),
         ("intensity", 1e30),
+        ("shape", SPHERE),
     ):
         lights = ones.copy()
+        lights["radius"] = 0.2
         lights[name][3] = value
         assert np.array_equal(np.flatnonzero(~may_merge(lights)), [3])
         assert build_tree(lights).merged == 8
-    for name, value in (("link", 1), ("shadow", 1), ("diffuse", 0.5), ("exponent", 2.0)):
+    for name, value in (
+        ("link", 1),
+        ("shadow", 1),
+        ("shape", SPHERE),
+        ("diffuse", 0.5),
+        ("exponent", 2.0),
+    ):
         lights = ones.copy()
-        lights[name][3:5] = value
+        lights[name][3:5] = value  # the radius of a ball is 0.05 m
         assert build_tree(lights).merged == 8  # 8 lamps of one kind, 2 of another
     kinds = np.array([-1, -1, -1, -1, 0, 0, 0, 0, 7, 7])
     assert build_tree(ones, kinds).merged == 4

@@ -28,6 +28,12 @@ radius = 0.1
 enabled = true
 source = "data sheet"
 provenance = "measured"
+[[light]]
+match = "Road_*"
+ies = "road.ies"
+lumens = 5600
+axis = [0, 0.1, -1]
+c0 = [-1, 0, 0]
 [[material]]
 match = "Glass"
 luminance = 12000
@@ -36,6 +42,8 @@ temperature = 2700
 color = [1, 1, 1]
 diffuse = [0.2, 0.3, 0]
 gamma = 2.4
+specular = [0.02, 0.02, 0.02]
+roughness = 0.3
 source = "luminance meter"
 provenance = "estimated"
 [[camera]]
@@ -66,13 +74,18 @@ def test_every_key_is_known(tmp_path: Path) -> None:
     light = sidecar.match("light", "lamp_07")
     assert light is not None
     assert light.number("candela") == 3200.0
-    assert light.color() == (1.0, 0.5, 0.1)
+    assert light.three("color") == (1.0, 0.5, 0.1)
     assert light.number("radius") == 0.1
     assert light.values["enabled"] is True
+    road = sidecar.match("light", "Road_1")
+    assert road is not None
+    assert (road.values["ies"], road.number("lumens")) == ("road.ies", 5600.0)
+    assert (road.three("axis"), road.three("c0")) == ((0.0, 0.1, -1.0), (-1.0, 0.0, 0.0))
     material = sidecar.match("material", "Glass")
     assert material is not None
+    assert (material.three("specular"), material.number("roughness")) == ((0.02,) * 3, 0.3)
     assert material.values["hdr_texture"] is True
-    assert material.color("diffuse") == (0.2, 0.3, 0.0)
+    assert material.three("diffuse") == (0.2, 0.3, 0.0)
     assert material.provenance == "estimated"
     camera = sidecar.match("camera", "Driver")
     assert camera is not None
@@ -112,6 +125,7 @@ def test_what_somebody_wrote_down_is_authored_unless_it_says_more(tmp_path: Path
         ("light", "color = [1, 1, -1]", "color"),
         ("light", "color = [0, 0, 0]", "color"),
         ("light", 'color = "red"', "color"),
+        ("light", "ies = 3", "ies"),
         ("light", "enabled = 1", "enabled"),
         ("light", "source = 1", "source"),
         ("light", 'provenance = "guess"', "provenance"),
@@ -119,6 +133,10 @@ def test_what_somebody_wrote_down_is_authored_unless_it_says_more(tmp_path: Path
         ("material", "hdr_texture = 1", "hdr_texture"),
         ("material", "gamma = 0", "gamma"),
         ("material", "diffuse = [1, 2, nan]", "diffuse"),
+        ("material", "specular = 0.04", "specular"),
+        ("material", "specular = [0.1, 0.1, 1.1]", "specular"),
+        ("material", "roughness = 1.5", "roughness"),
+        ("material", "shininess = -1", "shininess"),
         ("camera", "fov = 180", "fov"),
         ("camera", "fov = 0", "fov"),
         ("camera", "near = 0", "near"),
@@ -133,8 +151,17 @@ def test_a_wrong_value_is_left_out_with_a_finding(
     (finding,) = report
     assert (finding.kind, finding.code, finding.thing) == (Kind.INVALID, "sidecar-invalid", key)
     assert str(finding.source) == f"photometry.toml:{section}[1]"
-    assert "; want " in finding.text or key == "color"
+    assert "; want " in finding.text
     assert key not in sidecar.rules[0].values
+
+
+@pytest.mark.parametrize(
+    "line", ["scale = -1", "lumens = inf", "axis = [0, 0, 0]", "c0 = [1, 0]", 'c0 = "x"']
+)
+def test_a_wrong_value_beside_a_photometric_file(tmp_path: Path, line: str) -> None:
+    _, report = read(tmp_path, f'[[light]]\nmatch = "x"\nies = "a.ies"\n{line}\n')
+    (finding,) = report
+    assert (finding.code, finding.thing) == ("sidecar-invalid", line.split()[0])
 
 
 @pytest.mark.parametrize(
@@ -143,7 +170,16 @@ def test_a_wrong_value_is_left_out_with_a_finding(
         ("gama = 2.2", "sidecar-unknown-key", "gama"),
         ("[lights]\nx = 1", "sidecar-unknown-key", "lights"),
         ('[[light]]\nmatch = "a"\ncandle = 3', "sidecar-unknown-key", "light[1]"),
-        ('[[light]]\nmatch = "a"\nies = "a.ies"', "sidecar-unknown-key", "light[1]"),
+        ('[[light]]\nmatch = "a"\nfile = "a.ies"', "sidecar-unknown-key", "light[1]"),
+        ('[[light]]\nmatch = "a"\nscale = 2', "sidecar-invalid", "light[1]"),
+        ('[[light]]\nmatch = "a"\nc0 = [1, 0, 0]', "sidecar-invalid", "light[1]"),
+        ('[[light]]\nmatch = "a"\nies = "a"\ncandela = 2', "sidecar-rival", "light[1]"),
+        ('[[light]]\nmatch = "a"\nies = "a"\nscale = 1\nlumens = 2', "sidecar-rival", "light[1]"),
+        (
+            '[[material]]\nmatch = "a"\nroughness = 0.1\nshininess = 2',
+            "sidecar-rival",
+            "material[1]",
+        ),
         ("gamma = 0", "sidecar-invalid", "gamma"),
         ("gamma = [2.2]", "sidecar-invalid", "gamma"),
         ("ambient = 3", "sidecar-invalid", "ambient"),

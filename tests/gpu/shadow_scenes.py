@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import moderngl
@@ -86,39 +86,22 @@ def seen(
     found = shadows.update(shown)
     kind, row = str(found.kind[light]), shown.lights[light]
     assert kind, "the light has no shadows"
-    shadows.use(0)
-    uniforms = shadows.uniforms(kind)
     data = found.rows[light, : shadow_rows(kind)]
     points = np.asarray(points, np.float64)
-    eye = shown.camera.eye
-    return read_visibility(gl, kind, row, data, points, eye, uniforms, normal, shadows.defines)
-
-
-def read_visibility(
-    gl: moderngl.Context,
-    kind: str,
-    row: Array,
-    data: Array,
-    points: Array,
-    eye: Sequence[float],
-    uniforms: Mapping[str, Any],
-    normal: Sequence[float] = (0.0, 0.0, 1.0),
-    defines: Mapping[str, int] | None = None,
-) -> Array:
-    """(n,) what ``visibility`` gives for a light and its texels, the atlas on unit 0."""
+    eye = np.asarray(shown.camera.eye)
     size = float(row["radius"] if row["w"] > 0.0 else np.tan(row["angle"]))
-    vectors = [row["position"] - row["w"] * np.asarray(eye), row["axis"], row["x"], row["y"]]
+    vectors = [row["position"] - row["w"] * eye, row["axis"], row["x"], row["y"]]
     lamp = f"ShadowLight({', '.join(map(_vector, vectors))}, {size!r})"
     rows = f"vec4[{len(data)}]({', '.join(map(_vector, data))})"
-    gl.extra["framebuffer"].use()
+    shadows.use(0)
     return evaluate(
         gl,
         "gpu/shaders/shadow.glsl",
         f"visibility(p, n, {lamp}, {rows})",
         {"p": points - eye, "n": np.tile(np.asarray(normal, float), (len(points), 1))},
         "float",
-        uniforms={"shadow_atlas": 0, **uniforms},
-        defines=dict(defines or {}) | dict.fromkeys(kind.split(), 1),
+        uniforms={"shadow_atlas": 0, **shadows.uniforms(kind)},
+        defines=shadows.defines | dict.fromkeys(kind.split(), 1),
     ).astype(np.float64)
 
 

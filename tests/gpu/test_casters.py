@@ -25,23 +25,22 @@ class Spy:
     """Counts the tiles that are drawn."""
 
     def __init__(self, shadows: ShadowMaps, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.still = self.moving = 0
-        drawing = shadows._drawing
-        draws = {"still": drawing.draw_still, "moving": drawing.draw_moving}
+        self.counts = dict.fromkeys(("draw", "keep", "redraw"), 0)
+        for name in self.counts:
+            monkeypatch.setattr(shadows._drawing, name, self.counted(shadows._drawing, name))
 
-        def count(name: str) -> Any:
-            def counted(tiles: Any, groups: Any) -> None:
-                setattr(self, name, getattr(self, name) + len(tiles))
-                draws[name](tiles, groups)
+    def counted(self, drawing: Any, name: str) -> Any:
+        draws = getattr(drawing, name)
 
-            return counted
+        def count(tiles: Any, groups: Any) -> None:
+            self.counts[name] += len(tiles)
+            draws(tiles, groups)
 
-        monkeypatch.setattr(drawing, "draw_still", count("still"))
-        monkeypatch.setattr(drawing, "draw_moving", count("moving"))
+        return count
 
-    def taken(self) -> tuple[int, int]:
-        counts = self.still, self.moving
-        self.still = self.moving = 0
+    def taken(self) -> tuple[int, ...]:
+        counts = tuple(self.counts.values())
+        self.counts = dict.fromkeys(self.counts, 0)
         return counts
 
 
@@ -141,22 +140,25 @@ def test_what_stands_still_is_drawn_once(gl: Any, monkeypatch: pytest.MonkeyPatc
     spy = Spy(shadows, monkeypatch)
     lamps = [LAMP, LAMP | {"position": (2.0, 0.0, 4.0)}]
     shadows.update(scene(lamps, FLOOR, draw(ROOF)))
-    assert spy.taken() == (10, 10)  # each lamp's lower faces: nothing is above it
+    assert spy.taken() == (10, 0, 0)  # each lamp's lower faces: nothing is above it
     # Another moment, another eye, lamps of another brightness: nothing is drawn.
     brighter = [lamp | {"intensity": 900.0} for lamp in lamps]
     shadows.update(scene(brighter, FLOOR, draw(ROOF), camera=Camera(eye=(0.1, -6.0, 5.0))))
-    assert spy.taken() == (0, 0)
+    assert spy.taken() == (0, 0, 0)
     # A lamp moves: its own tiles alone.
     lamps[1] = LAMP | {"position": (2.1, 0.0, 4.0)}
     shadows.update(scene(lamps, FLOOR, draw(ROOF)))
-    assert spy.taken() == (5, 5)
-    # Something moves under the first one: drawn anew once, with room for what moves; then the
-    # tiles that see it.
+    assert spy.taken() == (5, 0, 0)
+    # Something moves below both, in one tile of each: their tiles are kept apart once.
     for x in (0.0, 0.1, 0.2):
         thing = draw(plane(0.1, 1.0, "thing"), 0, move(x, 0, 0), moving=True)
         shadows.update(scene(lamps, FLOOR, draw(ROOF), thing))
-        still, moving = spy.taken()
-        assert (still, moving) == ((10, 10) if x == 0.0 else (0, 2))
+        assert spy.taken() == (0, 0 if x else 10, 2)
+    # It goes: the tiles that saw it once more.
+    shadows.update(scene(lamps, FLOOR, draw(ROOF)))
+    assert spy.taken() == (0, 0, 2)
+    shadows.update(scene(lamps, FLOOR, draw(ROOF)))
+    assert spy.taken() == (0, 0, 0)
 
 
 def test_lights_that_need_no_shadows(gl: Any) -> None:

@@ -1,4 +1,4 @@
-"""What tiles look at: cones, cube faces, cascades. NumPy only, but for the map of a direction."""
+"""What tiles look at: cones, cube faces, cascades. NumPy only."""
 
 from __future__ import annotations
 
@@ -10,13 +10,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from shadow_scenes import along, draw, maps, plane, read_visibility, scene
 from small_scenes import lights, look
 
 from hdrusd.gpu.cascades import distant_view, view_balls
 from hdrusd.gpu.casters import frustum_sees
-from hdrusd.gpu.direction_map import DirectionMap
-from hdrusd.gpu.program import Programs
 from hdrusd.gpu.shadow_views import BORDER, lit_faces, local_view, widest_angle
 from hdrusd.scene import CYLINDER, DISK, NO_CONE, Camera, Profile
 
@@ -144,21 +141,3 @@ def test_boxes_in_a_frustum() -> None:
         ]
     )
     assert frustum_sees(spot.matrices(64), boxes).tolist() == [[True, False, False, True, True]]
-
-
-def test_the_map_of_a_direction(gl: Any) -> None:
-    """Light from 45 degrees beside: a square 2 m up hides it 2 m to the other side."""
-    shown = scene({"shadow": 0}, draw(plane(50.0)), draw(plane(0.5, 2.0, "square"), moving=True))
-    shadows = maps(gl)
-    shadows.update(shown)
-    sky = DirectionMap(gl, Programs(gl), shadows.casters, 1024)
-    places = along((-4.0, 0.1, 0.0), (0.0, 0.1, 0.0), 401)
-    eye = shown.camera.eye
-    for x, z in ((0.5**0.5, 0.5**0.5), (0.0, 1.0)):
-        data = sky.draw((x, 0.0, z), eye, (0.0, 0.0, 0.0), 5.0)
-        (row,) = lights({"position": (x, 0.0, z), "w": 0.0})
-        sky.use(0)
-        share = read_visibility(gl, "SHADOW_ORTHO", row, data, places, eye, sky.uniforms)
-        far = np.abs(places[:, 0] + 2.0 * x / z)
-        assert np.all(share[far < 0.48] == 0.0)
-        assert np.all(share[far > 0.52] == 1.0)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -100,7 +98,7 @@ def parallel_opening(x: Any, y: Any, corners: Any, height: float) -> Any:
     return np.abs(total) / (2 * PI)
 
 
-def roof(opening: Any, height: float, half: float = 40.0) -> list[Draw]:
+def roof(opening: Any, height: float, half: float = 400.0) -> list[Draw]:
     """Four plates around an opening."""
     (a, b), (c, d) = opening
     z = height
@@ -119,8 +117,12 @@ def test_an_opening_in_a_roof(gl: Any) -> None:
     got = lit(gl, scene, surfaces(normal, depth, f0=0.0, rho=1.0), 8192)[..., 0]
     x, y = places(view)
     corners = [(-0.8, -0.7), (1.2, -0.7), (1.2, 1.1), (-0.8, 1.1)]
-    # From the side, past the roof's rim of 40 m, comes 1 - cos(atan(3 / 40)) = 0.3 %, squared.
-    assert got == pytest.approx(parallel_opening(x, y, corners, 3.0), rel=0.02, abs=0.003)
+    wanted = parallel_opening(x, y, corners, 3.0)
+    # Of 8192 directions 200 to 270 pass the opening; a lattice's count in a region that small is
+    # right to about the root of the number at its edge, 60: 8 in 235, 3.4 %. Over all pixels it
+    # evens out.
+    assert got == pytest.approx(wanted, rel=0.035)
+    assert got.mean() == pytest.approx(wanted.mean(), rel=0.005)
 
 
 def test_the_sky_s_colours_come_from_their_own_sides(gl: Any) -> None:
@@ -177,56 +179,3 @@ def test_a_caster_at_the_end_of_the_world_does_not_take_the_depth_s_digits() -> 
     views = Views(box, far, even_directions(16))
     # 24 bits of depth: a step is not above a tenth of a texel.
     assert (views.texel / 10.0 > 1.0 / (views.scales(slice(None)) * 2.0**24)).all()
-
-
-# -- the truth set's room, its G-buffer from rays
-
-
-def cast(case: Any, plain: Any) -> tuple[Any, Any, Any]:
-    """Camera, normals and distances of the room by intersection with its rectangles."""
-    width, height = case["resolution"]
-    view = plain["camera"]
-    forward, up = (np.asarray(view[name]) for name in ("forward", "up"))
-    half = math.tan(math.radians(view["horizontal_fov_deg"]) / 2)
-    window = (-half, half, -half * height / width, half * height / width)
-    right = np.cross(forward, up)
-    camera = Camera(tuple(view["eye_m"]), tuple(right), tuple(up), tuple(-forward), window)
-    x = window[0] + (np.arange(width) + 0.5) / width * 2 * half
-    y = window[3] - (np.arange(height) + 0.5) / height * 2 * window[3]
-    rays = forward + x[None, :, None] * right + y[:, None, None] * up
-    normal, nearest = np.zeros_like(rays), np.full(rays.shape[:2], np.inf)
-    for surface in plain["surfaces"]:
-        corner, u, v = (np.asarray(surface[n]) for n in ("corner_m", "edge_u_m", "edge_v_m"))
-        n = np.cross(u, v) / np.linalg.norm(np.cross(u, v))
-        away = rays @ n
-        distance = ((corner - camera.eye) @ n) / np.where(away == 0.0, 1.0, away)
-        hit = np.asarray(camera.eye) + distance[..., None] * rays - corner
-        s, t = hit @ u / (u @ u), hit @ v / (v @ v)
-        inside = (distance > 1e-9) & (away != 0.0) & (distance < nearest)
-        inside &= (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1)
-        nearest[inside] = distance[inside]
-        normal[inside] = np.where(away[inside][:, None] < 0.0, n, -n)
-    return camera, normal, np.where(np.isfinite(nearest), nearest, 0.0)
-
-
-def test_probes_of_the_roof_opening(gl: Any, testdata: Path) -> None:
-    truth = testdata / "truth"
-    if not (truth / "expected.json").is_file():
-        pytest.skip("the test data has no truth set")
-    cases = json.loads((truth / "expected.json").read_text(encoding="utf-8"))["cases"]
-    (case,) = [case for case in cases if case["id"] == "roof_opening"]
-    plain = json.loads((truth / case["photometry"]).read_text(encoding="utf-8"))
-    view, normal, depth = cast(case, plain)
-    walls = [
-        draw(quad(*(s[name] for name in ("corner_m", "edge_u_m", "edge_v_m")), key=s["name"]))
-        for s in plain["surfaces"]
-    ]
-    lux = PI * plain["lights"][0]["luminance_nits"]
-    scene = RenderScene(
-        draws=tuple(walls), materials=(Material(),), ambient=(lux,) * 3, camera=view
-    )
-    rho = plain["materials"][0]["reflectance_rgb"]
-    got = lit(gl, scene, surfaces(normal, depth, f0=0.0, rho=np.asarray(rho)), 4096)
-    for probe in case["probes"]:
-        x, y = probe["pixel"]
-        assert got[y, x] == pytest.approx(probe["expect"]["RGB"], rel=probe["rel_tol"])

@@ -26,7 +26,7 @@ from hdrusd.units import LUMINANCE_WEIGHTS
 
 #: What a job does not do by itself, by the word for it among what a case covers or needs.
 OPTIONS: Mapping[str, Mapping[str, Any]] = {
-    "occlusion": {"sky_samples": 4096},
+    "occlusion": {"sky_samples": 16384},
 }
 
 #: Words for what is not computed by its definition alone, and what stands in. The rest is
@@ -37,7 +37,7 @@ APPROXIMATED = {
     "disk": "a polygon of 64 sides stands for it",
     "cylinder": "strips by a quadrature of six points",
     "lat-long texture": "spherical harmonics of bands 0, 1, 2 and 4",
-    "occlusion": "4096 directions are looked up in depth maps",
+    "occlusion": "16384 directions are looked up in depth maps",
 }
 
 

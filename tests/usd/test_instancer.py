@@ -203,6 +203,44 @@ def test_a_lamp_is_read_a_fixed_number_of_times(monkeypatch: Any) -> None:
     assert count[0] == 2
 
 
+def test_a_lamp_on_a_car_is_moved_and_read_again_only_where_it_changes(monkeypatch: Any) -> None:
+    """A headlight turned by a right angle about z shines along what y was; then it grows."""
+    from hdrusd.usd import extract
+
+    count = [0]
+    original = extract.read_light_row
+
+    def counted(*arguments: Any) -> Any:
+        count[0] += 1
+        return original(*arguments)
+
+    monkeypatch.setattr(extract, "read_light_row", counted)
+    stage = new_stage()
+    car = UsdGeom.Xform.Define(stage, "/Car")
+    place, turn, size = car.AddTranslateOp(), car.AddRotateZOp(), car.AddScaleOp()
+    for time, x, degrees, scale in ((0, 0, 0, 1), (1, 10, 90, 1), (2, 10, 90, 2)):
+        place.Set(Gf.Vec3d(x, 0, 0), time)
+        turn.Set(float(degrees), time)
+        size.Set(Gf.Vec3f(scale), time)
+    light = UsdLux.SphereLight.Define(stage, "/Car/Light")
+    light.CreateRadiusAttr(0.1)
+    light.AddTranslateOp().Set(Gf.Vec3d(1, 0, 0))
+    light.AddRotateYOp().Set(-90.0)  # -Z becomes +X
+    reader = StageReader(stage, Report(), default_sky=False)
+    rows = [reader.read(t, Camera(), sky_visible=True).lights.copy() for t in (0.0, 1.0, 2.0)]
+    assert count[0] == 2
+    assert [row["position"][0].tolist() for row in rows] == [
+        pytest.approx(wanted, abs=1e-9) for wanted in ([1, 0, 0], [10, 1, 0], [10, 2, 0])
+    ]
+    assert [row["axis"][0].tolist() for row in rows] == [
+        pytest.approx(wanted, abs=1e-9) for wanted in ([1, 0, 0], [0, 1, 0], [0, 1, 0])
+    ]
+    strength = [float(row["intensity"][0, 0]) for row in rows]
+    assert strength == pytest.approx([strength[0], strength[0], 4.0 * strength[0]])
+    assert [float(row["radius"][0]) for row in rows] == pytest.approx([0.1, 0.1, 0.2])
+    assert len({int(row["key"][0]) for row in rows}) == 1
+
+
 def test_a_copy_keeps_its_key_when_others_go() -> None:
     stage, _, made = lamps(UsdLux.SphereLight)
     made.CreateIdsAttr([11, 22, 33])

@@ -54,6 +54,13 @@ SPOTS = st.builds(
     radius=RADII,
     **COMMON,
 )
+PROFILES = st.builds(
+    PhotometricLight,
+    st.just("point"),
+    radius=RADII,
+    profile=st.sampled_from(["./street.textures/road_1a2b3c4d.ies", "./x.ldt"]),
+    **COMMON,
+)
 DISTANT = st.builds(PhotometricLight, st.sampled_from(["distant", "ambient"]), **COMMON)
 UNITS = st.sampled_from([1.0, 0.01, 0.0254, 1000.0])
 SCALES = st.sampled_from([1.0, 0.1, 37.5])
@@ -68,13 +75,15 @@ def written(light: PhotometricLight, unit: float, scale: float) -> tuple[Usd.Pri
 
 
 @settings(deadline=None)
-@given(st.one_of(POINTS, SPOTS, DISTANT), UNITS, SCALES)
+@given(st.one_of(POINTS, SPOTS, PROFILES, DISTANT), UNITS, SCALES)
 def test_what_is_written_is_read(light: PhotometricLight, unit: float, scale: float) -> None:
     prim, metres = written(light, unit, scale)
     back = read_light(prim, scale=metres)
-    for name in ("kind", "intensity", "cutoff", "softness", "exponent", "provenance", "rule"):
+    for name in ("kind", "cutoff", "softness", "exponent", "profile", "provenance", "rule"):
         assert getattr(back, name) == getattr(light, name), name
     assert back.source == light.source
+    # Only beside a file does the strength pass through nits: six roundings, radius squared.
+    assert back.intensity == pytest.approx(light.intensity, rel=6 * ULP if light.profile else 0.0)
     # Three channels rounded once; the luminance that is divided out sees all three.
     assert back.chromaticity == pytest.approx(light.chromaticity, rel=2 * ULP)
     if light.kind in ("point", "spot"):
@@ -82,7 +91,7 @@ def test_what_is_written_is_read(light: PhotometricLight, unit: float, scale: fl
 
 
 @settings(deadline=None)
-@given(st.one_of(POINTS, SPOTS, DISTANT), UNITS, SCALES)
+@given(st.one_of(POINTS, SPOTS, PROFILES, DISTANT), UNITS, SCALES)
 def test_plain_usdlux_says_the_same(light: PhotometricLight, unit: float, scale: float) -> None:
     prim, _ = written(light, unit, scale)
     reading = read_lux(prim)
@@ -112,6 +121,25 @@ def test_the_plain_values_are_those_of_the_decision() -> None:
     assert UsdLux.DistantLight(sun).GetIntensityAttr().Get() == pytest.approx(nits, rel=1e-6)
     sky, _ = written(PhotometricLight("ambient", math.pi), 0.01, 1.0)
     assert UsdLux.DomeLight(sky).GetIntensityAttr().Get() == pytest.approx(1.0, rel=ULP)
+
+
+def test_a_file_gives_the_candela_and_usdlux_multiplies_them() -> None:
+    # UsdLux, text of ShapingAPI: intensity pi r^2 times the file's candela.
+    lamp = PhotometricLight("point", 0.8, radius=0.2, profile="./road.ies")
+    prim, metres = written(lamp, 1.0, 1.0)
+    assert UsdLux.LightAPI(prim).GetIntensityAttr().Get() == pytest.approx(
+        0.8 / (math.pi * 0.04), rel=ULP
+    )
+    shaping = UsdLux.ShapingAPI(prim)
+    assert shaping.GetShapingIesFileAttr().Get().path == "./road.ies"
+    assert shaping.GetShapingConeAngleAttr().Get() == 180.0
+    assert (
+        not prim.HasAttribute("inputs:photometric:luminousIntensity")
+        or not prim.GetAttribute("inputs:photometric:luminousIntensity").HasAuthoredValue()
+    )
+    # A stranger's candela beside a file are no factor on it.
+    prim.GetAttribute("inputs:photometric:luminousIntensity").Set(5000.0)
+    assert read_light(prim, scale=metres).intensity == pytest.approx(0.8, rel=6 * ULP)
 
 
 def test_photometry_is_the_truth_where_both_are_there() -> None:

@@ -288,8 +288,14 @@ def test_a_photometric_file_gives_its_own_candela(tmp_path: Path) -> None:
     profile.write_text("IESNA:LM-63-2002\n")
     inputs = AGREEING["Sphere"].replace("= 1000", "= 1")
     assert found(light("Sphere", inputs)) != []
-    named = f"{inputs}\n asset inputs:photometric:file = @{profile}@"
-    assert found(light("Sphere", named)) == []
+    shaped = inputs.replace("float inputs:photometric:luminousIntensity = 1", "")
+    assert shaped != inputs
+    file = f"asset inputs:shaping:ies:file = @{profile}@"
+    apis = '"HdrusdPhotometricLightAPI", "ShapingAPI"'
+    assert found(light("Sphere", f"{shaped}\n{file}", apis)) == []
+    problem = only(light("Sphere", f"{inputs}\n{file}", apis))
+    assert problem.severity == "warning"
+    assert "beside a photometric file" in problem.text
 
 
 def test_lights_that_have_no_closed_form_are_only_checked_for_soundness() -> None:
@@ -504,7 +510,7 @@ def test_check_that_breaks_down_is_an_error(monkeypatch: pytest.MonkeyPatch) -> 
     def broken(*_: object) -> None:
         raise RuntimeError("no more")
 
-    monkeypatch.setattr(validation, "read_lux", broken)
+    monkeypatch.setattr(validation.lux, "read_lux", broken)
     problem = only(light("Sphere", AGREEING["Sphere"]))
     assert problem.severity == "error"
     assert "the check broke down: RuntimeError('no more')" in problem.text

@@ -2,6 +2,7 @@
 // Variants by #define: what is not there must cost nothing, and a software device executes
 // both sides of a branch. NAME_MAP is what a texture adds to a field: nothing, or
 // "+ texel(k).rgb * name_scale"; the field itself is then the bias.
+#include "photometry/microfacet.glsl"
 #include "photometry/reflectance.glsl"
 #include "photometry/sky.glsl"
 
@@ -56,6 +57,12 @@ uniform vec3 ambient;          // lux
 #endif
 uniform float lambert_scale;   // 1/pi, or 1 for petit2010
 
+#ifdef GGX
+// mean_schlick of photometry/environment.glsl, over all views: off by 0.8 % of F90 where the
+// surface faces the eye, by 2 % at its rim.
+#define MEAN_SCHLICK 0.008
+#endif
+
 layout(location = 0) out vec4 g_normal;    // unit normal; distance along the view axis, m
 layout(location = 1) out vec4 g_diffuse;   // reflectance; shininess, or minus alpha of GGX
 layout(location = 2) out vec4 g_specular;  // reflectance at normal incidence; metallic
@@ -105,15 +112,25 @@ void main()
     n = bumped(n, bump NORMAL_MAP, image_place(NORMAL_PLACE));
 #endif
     n *= gl_FrontFacing ? 1.0 : back_sign;
-    // What comes from everywhere alike is mirrored by a metal as a diffuse surface scatters it.
 #ifdef SKY
     vec3 lux = ambient_lux(n, sky);
 #else
     vec3 lux = ambient;
 #endif
     lux *= clamp(occlusion OCCLUSION_MAP, 0.0, 1.0);
-    vec3 glow = max(emission EMISSION_MAP, 0.0) + lambert(base, lux, lambert_scale);
     vec3 rho = base * (1.0 - metal);
+    vec3 f0 = mix(specular SPECULAR_MAP, base, metal);
+#ifdef GGX
+    // What sky.frag mirrors is lost to what lies below.
+    vec3 scattered = rho * (1.0 - fresnel(f0, grazing_reflectance(f0, metal), MEAN_SCHLICK));
+#ifdef EXTRA
+    scattered *= 1.0 - coat_reflectance(clamp(clearcoat CLEARCOAT_MAP, 0.0, 1.0), MEAN_SCHLICK);
+#endif
+#else
+    // A metal of legacy materials mirrors the sky as a diffuse surface scatters it.
+    vec3 scattered = base;
+#endif
+    vec3 glow = max(emission EMISSION_MAP, 0.0) + lambert(scattered, lux, lambert_scale);
 #ifdef GGX
     float rough = clamp(roughness ROUGHNESS_MAP, 0.0, 1.0);
     float gloss = -max(rough * rough, 1e-3);
@@ -148,7 +165,7 @@ void main()
 #endif
     g_normal = vec4(n, depth);
     g_diffuse = vec4(rho, gloss);
-    g_specular = vec4(mix(specular SPECULAR_MAP, base, metal), metal);
+    g_specular = vec4(f0, metal);
     hdr = vec4(glow, shown);
 #ifdef EXTRA
     float smooth_coat = clamp(clearcoat_roughness CLEARCOAT_ROUGHNESS_MAP, 0.0, 1.0);

@@ -1,8 +1,8 @@
 // The G-buffer, read: where a pixel's surface is and which way it faces.
 
 uniform sampler2D g_normal;    // unit normal; distance along the view axis, m
-uniform sampler2D g_diffuse;   // reflectance; shininess
-uniform sampler2D g_specular;  // reflectance; opacity
+uniform sampler2D g_diffuse;   // reflectance; shininess, or minus alpha of GGX
+uniform sampler2D g_specular;  // reflectance at normal incidence; metallic
 uniform vec3 ray_origin, ray_x, ray_y;  // the window's corner and sides at distance 1, m
 uniform vec3 forward;          // unit vector along the view axis
 uniform bool orthographic;     // then the window is in m and does not grow with distance

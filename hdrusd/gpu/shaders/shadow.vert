@@ -3,9 +3,7 @@
 // atlas' clip space, tangent; x, y, z of its eye from the lamp in its frame, lamp's radius^2.
 // Both tables are 2^TABLE texels wide: division takes a software device longer than all else here.
 #define ROW 6
-#ifdef TILES
-uniform float fill;  // depth in clip space
-#else
+#ifndef TILES
 in vec3 in_position;
 #ifdef CUTOUT
 in vec2 in_uv;
@@ -29,9 +27,9 @@ void main()
     int row = texelFetch(pairs, ivec2(at & ((1 << TABLE) - 1), at >> TABLE), 0).r;
     vec4 area = texel(row, 4);
 #ifdef TILES
-    // The tile itself, as a strip of two triangles.
+    // The tile itself, as a strip of two triangles as far away as can be.
     vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
-    gl_Position = vec4(area.xy + corner * area.z * vec2(1.0, aspect), fill, 1.0);
+    gl_Position = vec4(area.xy + corner * area.z * vec2(1.0, aspect), 1.0, 1.0);
 #else
     vec4 p = vec4(in_position, 1.0), ball = texel(row, 5);
     vec4 clip = vec4(dot(texel(row, 0), p), dot(texel(row, 1), p), dot(texel(row, 2), p),

@@ -16,6 +16,9 @@ uniform mat3 axes;         // world to the dome's own
 #ifdef COATED
 uniform sampler2D g_extra; // clear coat: weight, alpha
 #endif
+#ifdef OCCLUDED
+uniform sampler2D arriving; // sky_occlusion.frag's
+#endif
 
 layout(location = 0) out vec4 hdr;
 
@@ -44,6 +47,11 @@ void main()
     vec2 coat = textureLod(g_extra, window, 0.0).xy;
     light *= 1.0 - coat_reflectance(coat.x, mean_schlick(nv));
     light += mirrored(n, v, nv, coat.y, vec3(0.04 * coat.x), vec3(coat.x));
+#endif
+#ifdef OCCLUDED
+    // A mirror is taken to see as much of the sky as the surface does all round.
+    vec4 sum = textureLod(arriving, window, 0.0);
+    light *= dot(sum.rgb, vec3(0.2126, 0.7152, 0.0722)) / max(sum.a, 1e-30);
 #endif
     hdr = vec4(gloss < 0.0 ? light * scale : vec3(0.0), 0.0);
 }

@@ -195,6 +195,20 @@ def test_ambient_light_is_mirrored_like_a_sky_of_its_luminance(gl: Any) -> None:
         )
 
 
+def test_what_hides_the_sky_takes_its_share_of_the_reflection(gl: Any) -> None:
+    normal, depth = leaning()
+    open_sky, hidden = (GBuffer(gl, **surfaces(normal, depth, f0=0.3)) for _ in range(2))
+    # A third of the luminance arrives: rgb of 1 against a of 3.
+    arriving = gl.texture(SIZE, 4, np.tile(np.float32([1, 1, 1, 3]), (*SIZE, 1)), dtype="f4")
+    shown = scene(ambient=(PI, PI, PI))
+    skies = sky_pass(gl)
+    skies.add_mirrored(shown, open_sky.layers, open_sky.frame, 1 / PI)
+    skies.add_mirrored(shown, hidden.layers, hidden.frame, 1 / PI, arriving)
+    wanted = open_sky.read()[..., :3] / 3.0
+    assert wanted.min() > 0.0
+    assert hidden.read()[..., :3] == pytest.approx(wanted, rel=1e-6)
+
+
 def test_a_clear_coat_mirrors_and_shades_what_is_below(gl: Any) -> None:
     normal, depth = leaning()
     alpha = np.full(depth.shape, 0.5)
@@ -241,7 +255,7 @@ def test_lux_of_skies_and_ambient_add_up_in_the_world(gl: Any) -> None:
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     own = irradiance_coefficients(texels)
     wanted = ambient_lux(normals @ rotation.T, own) * dome.factor + ambient_lux(normals, own)
-    assert ambient_lux(normals, got) == pytest.approx(wanted + [1.0, 2.0, 3.0], rel=1e-5)
+    assert ambient_lux(normals, got) == pytest.approx(wanted + np.array([1.0, 2.0, 3.0]), rel=1e-5)
 
 
 def test_a_sun_becomes_a_light_in_the_world_and_a_finding(gl: Any) -> None:
