@@ -150,8 +150,8 @@ COMPLEXITIES |= {"1.0": 0, "1.1": 1, "1.2": 2, "1.3": 3}
     type=click.IntRange(0, 1 << 20),
     default=0,
     show_default=True,
-    help="Directions in which surfaces hide the sky from one another; 4096 is good to 2 %. "
-    "0: nothing hides it.",
+    help="Directions in which surfaces hide the sky from one another; 4096 are good to "
+    "3 %, 16384 to 1 %. 0: nothing hides it.",
 )
 @click.option(
     "--compression",

@@ -9,7 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 from truth.cases import check, read_cases, render_case
-from truth_stages.closed_forms import FOLDER, TRUTHS, document, plane, png, point_plane
+from truth_stages.closed_forms import (
+    FOLDER,
+    TRUTHS,
+    document,
+    luminaire,
+    plane,
+    png,
+    point_plane,
+    radiance,
+    shaded,
+)
 
 from hdrusd.render import Job, render_sequence
 from hdrusd.report import Report
@@ -18,6 +28,9 @@ from hdrusd.report import Report
 #: texels (2^-11 = 5e-4) need the most.
 RELATIVE = 1e-3
 
+#: m at the box of spot_shadow: two texels of a shadow map of 2048 over 2 tan(65 degrees), 3 m away.
+EDGE = 2 * 3.0 * 2 * 2.1445 / 2048
+
 
 def frames(gl: Any, name: str, **options: Any) -> dict[float, np.ndarray]:
     job = Job(FOLDER / f"{name}.usda", list(map(float, TRUTHS[name].frames)), **options)
@@ -25,8 +38,10 @@ def frames(gl: Any, name: str, **options: Any) -> dict[float, np.ndarray]:
 
 
 def undecided(name: str) -> np.ndarray:
-    """(h, w) bool: pixels whose centre lies on an edge, here the pentagon's oblique ones."""
+    """(h, w) bool: pixels whose centre lies on an edge: the pentagon's oblique ones, a shadow's."""
     at = plane()
+    if name == "spot_shadow":
+        return np.asarray(shaded(at, EDGE) != shaded(at, -EDGE))[..., 0]
     off = np.abs(at[..., 1] + np.abs(at[..., 0] - 1.5) - 1.25)
     return np.asarray((name == "mesh_parts") & (off < 1e-9))
 
@@ -69,6 +84,8 @@ def test_gamma_decodes_pictures_and_not_maps(gl: Any) -> None:
 def test_expected_json_is_what_the_closed_forms_say() -> None:
     assert (FOLDER / "expected.json").read_text(encoding="utf-8") == document()
     assert (FOLDER / "code128.png").read_bytes() == png(128)
+    assert (FOLDER / "two_tone.hdr").read_bytes() == radiance()
+    assert (FOLDER / "luminaire.ies").read_text(encoding="utf-8") == luminaire()
 
 
 def test_every_stage_has_a_closed_form() -> None:

@@ -159,9 +159,12 @@ class HdrRenderer:
         del layers["hdr"]
         if not extra:
             layers.pop("g_extra", None)
-        self._light(scene, layers, self._frame, extras)
+        arriving = None
         if self._occlusion is not None:
             self._occlusion.add(scene, layers, self._frame)
+            arriving = self._occlusion.arriving
+        self.skies.add_mirrored(scene, layers, self._frame, self.scale, arriving)
+        self.lights.add(scene, layers, self._frame, extras, self._bind)
         self.skies.draw_background(scene, self._frame, self.size)
         self._add_blended(scene, extras, extra)
 
@@ -184,17 +187,6 @@ class HdrRenderer:
         ctx.depth_func = "<"
         self.surfaces.draw(scene, sky=self._sky(scene), extra="g_extra" in self._layers)
 
-    def _light(
-        self,
-        scene: RenderScene,
-        layers: dict[str, moderngl.Texture],
-        frame: moderngl.Framebuffer,
-        extras: Extras,
-    ) -> None:
-        """Steps two and three on one G-buffer."""
-        self.skies.add_mirrored(scene, layers, frame, self.scale)
-        self.lights.add(scene, layers, frame, extras, self._bind)
-
     def _add_blended(self, scene: RenderScene, extras: Extras, extra: bool) -> None:
         """Step four."""
         if not self.surfaces.blended(scene):
@@ -204,11 +196,14 @@ class HdrRenderer:
             self._peeling = Peeling(self.ctx, self.programs, self.size, extra=attached)
         peeling = self._peeling
         opaque = self._layers["g_normal"]
-        for layer in peeling.layers(scene, self.surfaces, opaque, sky=self._sky(scene)):
+        # Nothing hides the sky from what is blended: --sky-samples is for opaque surfaces.
+        sky = self.skies.lux_coefficients(scene) if scene.skies else None
+        for layer in peeling.layers(scene, self.surfaces, opaque, sky=sky):
             layers = dict(layer.textures)
             if not extra:
                 layers.pop("g_extra", None)
-            self._light(scene, layers, layer.frame, extras)
+            self.skies.add_mirrored(scene, layers, layer.frame, self.scale)
+            self.lights.add(scene, layers, layer.frame, extras, self._bind)
         peeling.merge(self._frame)
         if peeling.truncated:
             text = f"what lies behind {MAX_LAYERS} blended surfaces is not shown"

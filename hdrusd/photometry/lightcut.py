@@ -62,7 +62,7 @@ Indices = npt.NDArray[np.intp]
 #: Share of the light at a place by which merging may change it. The bound adds up what the
 #: worst place and normal of a tile would see of each node: the mean error that is found on
 #: streets is a tenth of it and less.
-EPSILON = 0.01
+EPSILON = 0.02
 
 #: How far (rms) merged lamps may turn the half vector, in widths of the narrowest lobe.
 LOBE_SHARE = 0.5

@@ -18,8 +18,10 @@ from pxr import Gf, Sdf, Usd, UsdLux
 from hdrusd.errors import SourceRef
 from hdrusd.photometry.light import PhotometricLight
 from hdrusd.report import Kind, Report
-from hdrusd.scene import NO_CONE, light_rows
+from hdrusd.scene import light_rows
 from hdrusd.units import LUMINANCE_WEIGHTS, distant_luminance, dome_luminance, sphere_luminance
+from hdrusd.usd.area import shape_row
+from hdrusd.usd.light_controls import light_key, read_controls
 from hdrusd.usd.lux import LuxReading, input_number, photometric_file, read_lux
 
 #: Full angle of a distant light that we write: the sun's and the moon's, degrees.
@@ -133,36 +135,25 @@ def read_light_row(
 ) -> npt.NDArray[np.void] | None:
     """A (1,) array of ``scene.LIGHT`` in world metres; None for domes and what is no light.
 
-    Disks and rectangles shine as Lambert's cosine from their centre, cylinders and
-    large spheres evenly from theirs: exact far away, and a finding.
+    The shape is that of usd/area.py. Cone and focus of an area light are taken from its
+    centre. A texture multiplies what it says (usd/light_texture.py).
     """
     reading = read_lux(prim, time, world=world, meters_per_unit=meters_per_unit)
     if reading is None or reading.kind in ("dome", "other"):
         return None
     strength, color = _photometric(prim, reading, time, report)
-    _note_unused(prim, time, report)
     row = light_rows(1)
-    rotation = world.ExtractRotationMatrix()
-    axis = -np.array(rotation.GetRow(2), np.float64)
-    axis /= max(float(np.linalg.norm(axis)), 1e-12)
-    row["axis"] = axis
-    for index, name in enumerate(("x", "y")):
-        side = np.array(world.GetRow3(index), np.float64)
-        row[name] = side / max(float(np.linalg.norm(side)), 1e-12)
     row["intensity"] = strength * color
-    row["outer"], row["inner"] = NO_CONE, NO_CONE
+    row["radius"], row["key"] = reading.radius, light_key(prim)
+    read_controls(prim, time, row, report)
+    stretched = shape_row(prim, row, world, meters_per_unit, time)
     if reading.kind == "distant":
-        row["position"], row["w"] = -axis, 0.0
+        row["position"], row["w"] = -row["axis"], 0.0
+        row["angle"] = math.radians(min(max(input_number(prim, "angle", time), 0.0), 180.0)) / 2.0
         return row
-    row["position"], row["w"] = np.array(world.ExtractTranslation()) * meters_per_unit, 1.0
-    row["radius"] = reading.radius
-    if reading.kind in ("disk", "rect"):
-        row["outer"] = row["inner"] = math.pi / 2
-        row["exponent"] = 1.0
-    if reading.kind in ("disk", "rect", "cylinder"):
-        _finding(
-            report, prim, "area-light", f"{reading.kind} shines from its centre", Kind.REPLACED
-        )
+    if stretched:
+        _finding(report, prim, "light-shape", stretched, Kind.REPLACED)
+    row["position"] = np.array(world.ExtractTranslation()) * meters_per_unit
     _read_shaping(prim, time, row, report)
     return row
 
@@ -213,14 +204,13 @@ def _photometric(
 
 
 def _note_unused(prim: Usd.Prim, time: Usd.TimeCode, report: Report) -> None:
-    """What UsdLux says and shader 1 has no term for."""
+    """What UsdLux says of a dome and shader 1 has no term for."""
     for name in ("diffuse", "specular"):
         if input_number(prim, name, time) != 1.0:
-            _finding(report, prim, "light-multiplier", f"inputs:{name} is not used")
-    authored = [prop.GetName() for prop in prim.GetAuthoredProperties()]
-    for name in ("collection:lightLink", "light:filters"):
-        if any(prop.startswith(name) for prop in authored):
-            _finding(report, prim, "light-linking", f"{name} is not used: it lights everything")
+            text = f"inputs:{name} of a dome is not used"
+            _finding(report, prim, "light-multiplier", text)
+    if any(p.GetName().startswith("collection:") for p in prim.GetAuthoredProperties()):
+        _finding(report, prim, "light-linking", "a dome lights everything")
 
 
 def _write_shaping(prim: Usd.Prim, light: PhotometricLight) -> None:

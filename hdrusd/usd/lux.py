@@ -134,7 +134,7 @@ def read_lux(
     if not is_light(prim):
         return None
     kind = light_kind(prim)
-    normalize = _value(prim, "normalize", time) is True
+    normalize = normalized(prim, time)
     radius = 0.0
     if kind == "other":
         return LuxReading((0.0, 0.0, 0.0), kind, radius)
@@ -148,11 +148,16 @@ def read_lux(
         if meters_per_unit is None:
             meters_per_unit = UsdGeom.GetStageMetersPerUnit(prim.GetStage())
         factor, radius = _area_factor(prim, kind, time, normalize, world, meters_per_unit)
-    red, green, blue = (channel * factor for channel in _luminance(prim, time))
+    red, green, blue = (channel * factor for channel in nits(prim, time))
     return LuxReading((red, green, blue), kind, radius)
 
 
-def _luminance(prim: Usd.Prim, time: Usd.TimeCode) -> RGB:
+def normalized(prim: Usd.Prim, time: Usd.TimeCode) -> bool:
+    """``inputs:normalize``: whether the strength is divided by the area."""
+    return _value(prim, "normalize", time) is True
+
+
+def nits(prim: Usd.Prim, time: Usd.TimeCode) -> RGB:
     """Nits per channel before ``normalize``: intensity 2^exposure colour temperature."""
     exposure = input_number(prim, "exposure", time)
     # math.exp2 raises from here on.

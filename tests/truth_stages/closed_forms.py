@@ -4,7 +4,8 @@ Every camera looks straight down, so the pixel [i, j] of 64 x 48 looks along
 ((i + 0.5) / 32 - 1) / 2, (1 - (j + 0.5) / 24) 3 / 8, -1 and meets the plane at height z
 where that says. Lambert: L = rho E / pi. Point light: E = I cos(theta) / d^2.
 
-``python tests/truth_stages/closed_forms.py`` writes expected.json and the texture anew.
+``python tests/truth_stages/closed_forms.py`` writes expected.json, the textures and the
+photometric file anew.
 """
 
 from __future__ import annotations
@@ -28,6 +29,9 @@ WIDTH, HEIGHT = 64, 48
 PI = math.pi
 MATTE = np.array([0.5, 0.4, 0.3])
 SKY = 10.0  # cd/m2; E = pi L, so a surface under it shows rho L
+
+#: Candela of luminaire.ies by C plane (0 to 360 in steps of 90) and gamma (0 to 90 in steps of 30).
+CANDELA = ((400, 500, 300, 0), (400, 300, 100, 50), (400, 200, 50, 0), (400, 350, 250, 80))
 
 
 def plane(z: float = 0.0, eye: tuple[float, ...] = (0.0, 0.0, 4.0)) -> Array:
@@ -171,6 +175,105 @@ def mesh_parts(_: float) -> Array:
     return np.where(pentagon, bright * SKY, result)
 
 
+def rect_light(_: float) -> Array:
+    """Lambert's contour formula: E = L / 2 sum of angle times the normal's upward part."""
+    at, turn = plane(), math.radians(30.0)
+    x, y = (
+        0.6 * np.array([math.cos(turn), math.sin(turn)]),
+        0.4 * np.array([-math.sin(turn), math.cos(turn)]),
+    )
+    corners = [np.array([*(a * x + b * y), 1.0]) for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+    ways = [corner + np.array([0.3, -0.2, 0.0]) - at for corner in corners]
+    ways = [way / np.linalg.norm(way, axis=-1, keepdims=True) for way in ways]
+    total = np.zeros((HEIGHT, WIDTH, 1))
+    for a, b in zip(ways, ways[1:] + ways[:1], strict=True):
+        normal = np.cross(b, a)  # seen from below the corners go counterclockwise
+        sine = np.linalg.norm(normal, axis=-1, keepdims=True)
+        angle = np.arctan2(sine, np.sum(a * b, axis=-1, keepdims=True))
+        total += angle * normal[..., 2:] / sine
+    return np.asarray(2000.0 / 2.0 * np.abs(total) * MATTE / PI)
+
+
+def disk_light(_: float) -> Array:
+    """A parallel disk: E = pi L / 2 (1 - (d2 + h2 - r2) / sqrt((d2 + h2 + r2)^2 - 4 d2 r2))."""
+    at = plane()
+    d2 = (at[..., :1] + 0.4) ** 2 + (at[..., 1:2] - 0.3) ** 2
+    h2, r2 = 0.8**2, 0.5**2
+    share = 0.5 * (1.0 - (d2 + h2 - r2) / np.sqrt((d2 + h2 + r2) ** 2 - 4.0 * d2 * r2))
+    return np.asarray(3000.0 * share * MATTE)
+
+
+def sphere_light(_: float) -> Array:
+    """E = pi L (r / d)^2 cos: the same as of a point of L pi r^2 candela, however near."""
+    return point_lux(plane(), 1000.0 * PI * 0.6**2, (0.3, -0.2, 0.7)) * MATTE / PI
+
+
+def photometric_file(_: float) -> Array:
+    """Bilinear in the angles; C = 0 is the light's +X, here +Y; C = 90 its +Y, here -X."""
+    at, place = plane(), (0.3, -0.2, 2.0)
+    away = at - np.asarray(place)
+    gamma = np.degrees(np.arccos(from_axis(at, place, (0.0, 0.0, -1.0)))) / 30.0
+    c = np.degrees(np.arctan2(-away[..., :1], away[..., 1:2])) % 360.0 / 90.0
+    table = np.array([*CANDELA, CANDELA[0]], np.float64)
+    i, j = np.minimum(c.astype(int), 3), np.minimum(gamma.astype(int), 2)
+    u, v = c - i, gamma - j
+    candela = (1.0 - u) * ((1.0 - v) * table[i, j] + v * table[i, j + 1])
+    candela = candela + u * ((1.0 - v) * table[i + 1, j] + v * table[i + 1, j + 1])
+    return 2.0 * candela * point_lux(at, 1.0, place) * MATTE / PI
+
+
+#: The lamp and the box of spot_shadow, m.
+BOX_LAMP, BOX_LOW, BOX_HIGH = (-0.8, 0.4, 3.0), (-0.3, -0.3, 0.5), (0.3, 0.3, 1.0)
+
+
+def shaded(at: Array, grow: float = 0.0) -> Array:
+    """(h, w, 1) bool: whether the box, larger by ``grow`` m all around, hides the lamp."""
+    way = np.asarray(BOX_LAMP) - at
+    low = (np.asarray(BOX_LOW) - grow - at) / way
+    high = (np.asarray(BOX_HIGH) + grow - at) / way
+    enter = np.minimum(low, high).max(axis=-1, keepdims=True)
+    leave = np.maximum(low, high).min(axis=-1, keepdims=True)
+    return np.asarray((enter < leave) & (leave > 0.0) & (enter < 1.0))
+
+
+def spot_shadow(_: float) -> Array:
+    """All that is in view lies within the 52 degrees that the cone fills."""
+    ground = np.where(shaded(plane()), 0.0, point_lux(plane(), 2000.0, BOX_LAMP))
+    top = inside(plane(BOX_HIGH[2]), (-0.3, 0.3), (-0.3, 0.3))
+    return np.where(top, point_lux(plane(BOX_HIGH[2]), 2000.0, BOX_LAMP), ground) * MATTE / PI
+
+
+def ggx_metal(_: float) -> Array:
+    """L = F D G / (4 n.l n.v) E: Walter et al. 2007 with separable Smith; F = F0 of a metal."""
+    at, place, alpha2 = plane(), (0.5, 0.25, 2.0), 0.45**4
+    to_light = np.asarray(place) - at
+    to_eye = np.array([0.0, 0.0, 4.0]) - at
+    to_light = to_light / np.linalg.norm(to_light, axis=-1, keepdims=True)
+    to_eye = to_eye / np.linalg.norm(to_eye, axis=-1, keepdims=True)
+    half = to_light + to_eye
+    nh = half[..., 2:] / np.linalg.norm(half, axis=-1, keepdims=True)
+    nl, nv = to_light[..., 2:], to_eye[..., 2:]
+    d = alpha2 / (PI * (nh**2 * (alpha2 - 1.0) + 1.0) ** 2)
+    g = [2.0 * c / (c + np.sqrt(alpha2 + (1.0 - alpha2) * c**2)) for c in (nl, nv)]
+    lobe = d * g[0] * g[1] / (4.0 * nl * nv) * np.array([0.9, 0.6, 0.3])
+    return np.asarray(lobe * point_lux(at, 1000.0, place))
+
+
+def two_tone_dome(_: float) -> Array:
+    """A surface tilted by t sees (1 + cos t) / 2 of what is above the horizon."""
+    x, y = plane()[..., :1] / 4.0, plane()[..., 1:2] / 4.0  # the ray's ways for one down
+    slope = math.sqrt(3.0)  # z = slope (x - 0.05)
+    along = (4.0 + slope * 0.05) / (1.0 + slope * x)
+    panel = (x * along > 0.05) & (x * along < 0.55) & (np.abs(y * along) < 0.71)
+    return np.where(panel, 0.75 * 512.0 + 0.25 * 64.0, 512.0) * MATTE
+
+
+def light_link(_: float) -> Array:
+    linked = point_lux(plane(), 1000.0, (0.5, 0.25, 2.0))
+    free = point_lux(plane(), 500.0, (-0.5, 0.5, 1.5))
+    return np.where(plane()[..., :1] < 0.0, linked + free, free) * MATTE / PI
+
+
 @dataclass(frozen=True)
 class Truth:
     """A stage's closed form: time code to (h, w, 3) cd/m2; pixels worth a probe."""
@@ -209,6 +312,18 @@ TRUTHS: Mapping[str, Truth] = {
         ("subsets", "holes", "left-handed", "back faces", "polygons"),
         ((8, 32), (24, 32), (40, 32), (56, 32), (8, 12), (32, 12), (56, 12), (49, 5)),
     ),
+    "rect_light": Truth(rect_light, ("area light", "rect")),
+    "disk_light": Truth(disk_light, ("area light", "disk")),
+    "sphere_light": Truth(sphere_light, ("area light", "sphere")),
+    "photometric_file": Truth(photometric_file, ("IES LM-63", "candela multiplier", "type C")),
+    "spot_shadow": Truth(
+        spot_shadow, ("spot light", "shadow", "cube"), ((8, 8), (32, 24), (42, 30), (55, 40))
+    ),
+    "ggx_metal": Truth(ggx_metal, ("specular", "GGX", "metallic")),
+    "two_tone_dome": Truth(
+        two_tone_dome, ("dome light", "lat-long texture", "dome orientation"), ((8, 8), (38, 24))
+    ),
+    "light_link": Truth(light_link, ("light linking", "point light")),
 }
 
 
@@ -266,6 +381,20 @@ def png(code: int) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", row) + chunk(b"IEND", b"")
 
 
+def radiance() -> bytes:
+    """A Radiance picture of 32 x 16 pixels: 512 above the horizon, 64 below, all channels."""
+    header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 16 +X 32\n"
+    return header + bytes([128, 128, 128, 138]) * 256 + bytes([128, 128, 128, 135]) * 256
+
+
+def luminaire() -> str:
+    """``CANDELA`` as a file of IESNA LM-63-2002."""
+    planes = [*CANDELA, CANDELA[0]]
+    rows = ["0 30 60 90", "0 90 180 270 360", *(" ".join(map(str, row)) for row in planes)]
+    lines = ["IESNA:LM-63-2002", "[TEST] hdrusd", "TILT=NONE", "1 -1 1 4 5 1 2 0 0 0", "1 1 10"]
+    return "\n".join([*lines, *rows, ""])
+
+
 def document() -> str:
     """expected.json as text, a probe a line."""
     text = json.dumps(expected(), indent=1)
@@ -275,3 +404,5 @@ def document() -> str:
 if __name__ == "__main__":
     (FOLDER / "expected.json").write_text(document(), encoding="utf-8")
     (FOLDER / "code128.png").write_bytes(png(128))
+    (FOLDER / "two_tone.hdr").write_bytes(radiance())
+    (FOLDER / "luminaire.ies").write_text(luminaire(), encoding="utf-8")

@@ -2,6 +2,9 @@
 // position, w | intensity, 1/radius^2 | axis, exponent | x, inner | y, 1/width | factor on
 // diffuse, factor on specular, link, radius (of a distant light: tangent of half its angle);
 // then those of its shadow (SHADOW_ROWS), then those of its profile.
+#if defined(RECT) || defined(DISK) || defined(SPHERE) || defined(CYLINDER)
+#include "photometry/area.glsl"
+#endif
 #ifdef SHADOWED
 #include "gpu/shaders/shadow.glsl"
 #endif

@@ -1,0 +1,56 @@
+"""What a light is told beside its strength and shape: multipliers, shadows, filters; its key."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from pxr import Usd, UsdLux
+
+from hdrusd.errors import SourceRef
+from hdrusd.report import Kind, Report
+from hdrusd.usd.lux import input_number, input_source
+
+#: Inputs of ShadowAPI that are not physical and not read, and when they change nothing.
+_SHADOW_INPUTS = {
+    "shadow:color": (0.0, 0.0, 0.0),
+    "shadow:distance": -1.0,
+    "shadow:falloff": -1.0,
+    "shadow:falloffGamma": 1.0,
+}
+
+
+def light_key(prim: Usd.Prim) -> int:
+    """A number of the light by its path, the same in every frame and run."""
+    digest = hashlib.blake2b(str(prim.GetPath()).encode(), digest_size=8).digest()
+    return int.from_bytes(digest, "little", signed=True)
+
+
+def read_controls(
+    prim: Usd.Prim, time: Usd.TimeCode, rows: npt.NDArray[np.void], report: Report
+) -> None:
+    """Fill ``diffuse``, ``specular`` and ``shadow`` of rows of ``scene.LIGHT``."""
+
+    def finding(kind: Kind, code: str, text: str) -> None:
+        place = SourceRef(Path(prim.GetStage().GetRootLayer().identifier))
+        report.add(kind, code, place, str(prim.GetPath()), text)
+
+    for name in ("diffuse", "specular"):
+        factor = input_number(prim, name, time)
+        if factor < 0.0:
+            text = f"inputs:{name} {factor:g}; read as 0"
+            finding(Kind.CLAMPED, "light-multiplier", text)
+        rows[name] = np.maximum(factor, 0.0)  # NaN stays, and the light is left out
+    if prim.HasAPI(UsdLux.ShadowAPI):
+        source = input_source(prim, "shadow:enable")
+        rows["shadow"] = 0 if source and source.Get(time) is False else 1
+        for name, neutral in _SHADOW_INPUTS.items():
+            source = input_source(prim, name)
+            value = source.Get(time) if source else None
+            if value is not None and not np.allclose(np.ravel(value), np.ravel(neutral)):
+                finding(Kind.DROPPED, "shadow-input", f"inputs:{name} is not used")
+    filters = prim.GetRelationship("light:filters")
+    if filters and filters.GetTargets():
+        finding(Kind.DROPPED, "light-filters", "light filters are not used")
