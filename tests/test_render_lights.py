@@ -103,16 +103,20 @@ def test_edited_plain_values_are_told(gl: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("more", "code"),
+    ("more", "share"),
     [
-        ("float inputs:diffuse = 0", "light-multiplier"),
-        ("float inputs:specular = 0.5", "light-multiplier"),
-        ("rel collection:lightLink:includes = </Nothing>", "light-linking"),
+        ("float inputs:diffuse = 0", 0.0),
+        ("float inputs:diffuse = 0.5", 0.5),
+        ("float inputs:specular = 0", 1.0),
+        ("rel collection:lightLink:excludes = </Ground>", 0.0),
+        ("rel collection:lightLink:excludes = </Nothing>", 1.0),
     ],
 )
-def test_what_is_not_used_is_told(gl: Any, tmp_path: Path, more: str, code: str) -> None:
-    _, report = show(gl, write_stage(tmp_path / "a.usda", GROUND, lamp(more)))
-    assert code in report.codes()
+def test_factors_and_links(gl: Any, tmp_path: Path, more: str, share: float) -> None:
+    picture, report = show(gl, write_stage(tmp_path / "a.usda", GROUND, lamp(more)))
+    wanted = share * 1000.0 / 4.0 / math.pi
+    assert middle(picture) == pytest.approx(wanted, rel=1e-3, abs=1e-9)
+    assert not report.codes() & {"light-multiplier", "light-linking"}
 
 
 @pytest.mark.parametrize(

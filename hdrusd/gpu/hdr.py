@@ -116,6 +116,7 @@ class HdrRenderer:
         self._depth = ctx.depth_texture(size)
         self._gbuffer = ctx.framebuffer(list(self._layers.values()), self._depth)
         self._frame = ctx.framebuffer([self._layers["hdr"]], self._depth)
+        self._distances = ctx.framebuffer([self._layers["g_normal"]], self._depth)
         self._peeling: Peeling | None = None
         self._samples = tuple(offsets(options.samples))
         self._sum = Accumulator(ctx, programs, size) if options.samples > 1 else None
@@ -146,9 +147,13 @@ class HdrRenderer:
     def layer(self, name: str) -> npt.NDArray[np.float32]:
         """A layer of the G-buffer (``LAYERS``; gbuffer.frag) as (h, w, 4), top row first.
 
-        Of the opaque surfaces alone, and of a supersampled frame its last sample.
+        Of the opaque surfaces alone, 0 where there is none; of a supersampled frame its
+        last sample.
         """
-        return self._read(self._layers[name])
+        values = self._read(self._layers[name])
+        if name == "hdr":
+            return values
+        return np.where(self._read(self._layers["g_normal"])[..., 3:] != 0.0, values, 0.0)
 
     # -- the steps -----------------------------------------------------------------------
 
@@ -177,12 +182,10 @@ class HdrRenderer:
             self._gbuffer.release()
             self._gbuffer = ctx.framebuffer(list(self._layers.values()), self._depth)
             self._peeling = None
+        # What else the G-buffer holds is read only where there is a surface.
+        self._distances.clear(depth=1.0)
+        self._frame.clear(*scene.background, 0.0)
         self._gbuffer.use()
-        self._gbuffer.clear(depth=1.0)
-        if any(scene.background):
-            self._frame.use()
-            self._frame.clear(*scene.background, 0.0, depth=1.0)
-            self._gbuffer.use()
         ctx.enable_only(moderngl.DEPTH_TEST)
         ctx.depth_func = "<"
         self.surfaces.draw(scene, sky=self._sky(scene), extra="g_extra" in self._layers)

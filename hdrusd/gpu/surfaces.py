@@ -228,6 +228,8 @@ class SurfacePass:
         centres = np.concatenate([batch.centres for batch in batches])
         radii = np.concatenate([batch.radii for batch in batches])
         seen = in_view(scene.camera, centres, radii)
+        away = np.linalg.norm(centres - np.asarray(scene.camera.eye), axis=1) - radii
+        nearest: dict[int, float] = {}
         first = 0
         for batch in batches:
             own = seen[first : first + len(batch.radii)]
@@ -235,8 +237,10 @@ class SurfacePass:
             if own.any():
                 blended = is_blended(scene.materials[batch.state.material])
                 self._calls[blended].append(_Call(batch, batch.show(own)))
+                nearest[id(batch)] = float(away[first - len(own) : first][own].min())
+        # What is near hides what is far, which then costs nothing.
         for calls in self._calls.values():
-            calls.sort(key=lambda call: call.batch.state.material)
+            calls.sort(key=lambda call: nearest[id(call.batch)])
 
     def _frame_uniforms(self, scene: RenderScene) -> dict[str, bytes]:
         camera = scene.camera

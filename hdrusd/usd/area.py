@@ -34,7 +34,7 @@ def shape_row(
     meters_per_unit: float,
     time: Usd.TimeCode,
 ) -> str:
-    """Shape, axis, x and y of the (1,) row of a local light, whose radius is known already.
+    """Shape, axis, x and y of the (1,) row of a light, whose radius is known already.
 
     Returns what is not as it should be, "" for nothing.
     """
@@ -42,6 +42,8 @@ def shape_row(
     x, y, z = np.array(world, np.float64)[:3, :3] * meters_per_unit
     row["axis"], row["x"], row["y"] = _frame(x, y, z)
     row["outer"] = row["inner"] = NO_CONE
+    if kind == "distant":
+        return ""
     if kind == "sphere":
         point = prim.GetAttribute("treatAsPoint").Get(time) is True
         if point or not row["radius"][0] > 0.0:

@@ -17,17 +17,21 @@ from pxr import Usd, UsdGeom, UsdLux
 
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.report import Kind, Report
-from hdrusd.scene import LIGHT, Camera, RenderScene, light_rows
+from hdrusd.scene import LIGHT, RECT, Camera, RenderScene, light_rows
 from hdrusd.units import dome_luminance
 from hdrusd.usd.ambient import has_ambient, read_ambient
 from hdrusd.usd.bindings import Bindings
 from hdrusd.usd.camera import Conform, framing_camera, read_camera
+from hdrusd.usd.emitters import Emitters
 from hdrusd.usd.facing import facing
 from hdrusd.usd.gprims import GprimReader
-from hdrusd.usd.instanced_lights import instanced_rows, joined, light_key, moved_row
+from hdrusd.usd.instanced_lights import instanced_rows, joined, moved_row
 from hdrusd.usd.instancer import Copies, Instancers
 from hdrusd.usd.light import light_time_varying, read_light_row
+from hdrusd.usd.light_texture import LightTextures
+from hdrusd.usd.linking import Links
 from hdrusd.usd.lux import is_light
+from hdrusd.usd.mesh_light import MeshLight, is_mesh_light
 from hdrusd.usd.profile import Profiles
 from hdrusd.usd.varying import hides, place_varies, visible
 
@@ -50,6 +54,7 @@ class Light:
 @dataclass(slots=True)
 class _Plan:
     lights: list[Light] = field(default_factory=list)
+    meshes: list[MeshLight] = field(default_factory=list)
     domes: list[Usd.Prim] = field(default_factory=list)
     has_light: bool = False  # any light at all, hidden ones and those we cannot show included
 
@@ -79,8 +84,16 @@ class StageReader:
         self.bindings = Bindings(stage, report)
         self.instancers = Instancers(stage, self.purposes, report)
         self.profiles = Profiles(stage, report)
+        self.links = Links(stage, report)
+        self.textures = LightTextures(stage, report)
+        self.emitters = Emitters()
         self.gprims = GprimReader(
-            self.bindings, self.instancers, report, meters_per_unit=self.unit, level=level
+            self.bindings,
+            self.instancers,
+            report,
+            meters_per_unit=self.unit,
+            level=level,
+            links=self.links,
         )
         self._lamps: WeakKeyDictionary[Copies, npt.NDArray[np.void]] = WeakKeyDictionary()
         self._plan: _Plan | None = None
@@ -92,9 +105,8 @@ class StageReader:
         cache = UsdGeom.XformCache(code)
         plan = self._planned(code)
         self.bindings.update(code)
-        rows = [row for light in plan.lights if (row := self._light(light, cache)) is not None]
-        rows.extend(self._instanced_lights(code))
-        lights = joined(rows)
+        self.emitters.clear()
+        lights = joined([*self._lights(plan, cache), *self._instanced_lights(code)])
         ambient, skies = read_ambient(
             self.stage, plan.domes, cache, self.report, sky_visible=sky_visible
         )
@@ -108,15 +120,16 @@ class StageReader:
             )
         # Nobody chose the side from which a framing camera sees it.
         draws = self.gprims.draws(cache, code, two_sided=camera.framing)
-        if not draws and not self.gprims and not sky_visible:
+        lamps, glows = self.emitters.draws(len(self.bindings.materials), self.profiles.all)
+        if not draws and not self.gprims and not lamps and not sky_visible:
             raise InputError(
                 self._place(), "nothing to draw; want meshes or shapes of a purpose that is drawn"
             )
         return RenderScene(
             lights=lights,
             profiles=self.profiles.all,
-            draws=draws,
-            materials=tuple(self.bindings.materials),
+            draws=draws + lamps,
+            materials=(*self.bindings.materials, *glows),
             skies=skies,
             ambient=ambient,
             background=_sky_luminance(ambient) if sky_visible else (0.0, 0.0, 0.0),
@@ -177,7 +190,9 @@ class StageReader:
     def _walk(self, code: Usd.TimeCode) -> _Plan:
         plan = _Plan(has_light=has_ambient(self.stage))
         everything = Usd.PrimRange(self.stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
-        plan.has_light |= any(is_light(prim) for prim in everything)
+        for prim in filter(is_light, everything):
+            plan.has_light = True
+            self.links.note(prim)
         walk = iter(Usd.PrimRange(self.stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()))
         for prim in walk:
             if not self._wanted(prim):
@@ -209,12 +224,44 @@ class StageReader:
             plan.lights.append(
                 Light(prim, light_time_varying(prim), place_varies(prim), hides(prim))
             )
+        elif is_mesh_light(prim):
+            plan.meshes.append(MeshLight(prim, self.bindings, self.unit, self.report))
         else:
             self._finding(
                 Kind.DROPPED, "light-unknown", f"{prim.GetTypeName()} light is not shown", prim
             )
 
     # -- one frame -----------------------------------------------------------------------
+
+    def _lights(self, plan: _Plan, cache: UsdGeom.XformCache) -> Iterator[npt.NDArray[np.void]]:
+        """The rows of every light that is not copied, and what of them is seen."""
+        code = cache.GetTime()
+        for light in plan.lights:
+            row = self._light(light, cache)
+            if row is not None:
+                moving = light.varies or light.moves or light.hides
+                yield self._shown(light.prim, row, code, moving=moving)
+        for mesh in plan.meshes:
+            if visible(mesh.prim, code):
+                rows = mesh.rows(cache)
+                if not _sound(rows).all() or not len(rows):
+                    text = "not finite, negative or without area; left out"
+                    self._finding(Kind.INVALID, "light-invalid", text, mesh.prim)
+                    continue
+                self.links.assign(mesh.prim, rows)
+                self.emitters.show_mesh(mesh.draws(cache), mesh.luminance, moving=mesh.moving)
+                yield rows
+
+    def _shown(
+        self, prim: Usd.Prim, rows: npt.NDArray[np.void], code: Usd.TimeCode, *, moving: bool
+    ) -> npt.NDArray[np.void]:
+        """Rows as they shine, in tiles where a picture lies on them; notes what is seen."""
+        picture = self.textures.of(prim, code) if (rows["shape"] == RECT).all() else None
+        if picture is None:
+            self.emitters.show(rows, moving=moving)
+            return rows
+        self.emitters.show(rows, picture.texture, moving=moving)
+        return picture.tiles(rows)
 
     def _light(self, light: Light, cache: UsdGeom.XformCache) -> npt.NDArray[np.void] | None:
         if light.hides and not visible(light.prim, cache.GetTime()):
@@ -229,12 +276,12 @@ class StageReader:
             row = read_light_row(light.prim, cache.GetTime(), world, self.unit, self.report)
             if row is not None:
                 self.profiles.assign(light.prim, row, cache.GetTime())
+                self.links.assign(light.prim, row)
             if row is None or not _sound(row).all():
                 self._finding(
                     Kind.INVALID, "light-invalid", "not finite or negative; left out", light.prim
                 )
                 return None
-            row["key"] = light_key(light.prim)
             light.row, light.place = row, matrix
         return light.row
 
@@ -246,12 +293,14 @@ class StageReader:
             if known is None or light_time_varying(copies.source):
                 rows = instanced_rows(copies, code, self.unit, self.report)
                 self.profiles.assign(copies.source, rows, code)
+                self.links.assign(copies.source, rows)
                 sound = _sound(rows)
                 if not sound.all() or not len(rows):
                     text = "not finite, negative or no lamp; left out"
                     self._finding(Kind.INVALID, "light-invalid", text, copies.source)
                 known = self._lamps[copies] = rows[sound]
-            yield known
+            varies = copies.varies or light_time_varying(copies.source)
+            yield self._shown(copies.source, known, code, moving=varies)
 
     def _place(self) -> SourceRef:
         return SourceRef(Path(self.stage.GetRootLayer().identifier))

@@ -18,6 +18,7 @@ from hdrusd.scene import Draw, Geometry
 from hdrusd.usd.bindings import Bindings, Piece
 from hdrusd.usd.geometry import GeometryReader, time_varying
 from hdrusd.usd.instancer import Instancers
+from hdrusd.usd.linking import Links
 from hdrusd.usd.lux import is_light
 from hdrusd.usd.mesh import Topology, topology_varies
 from hdrusd.usd.skel import Skin, Skins
@@ -67,11 +68,13 @@ class GprimReader:
         *,
         meters_per_unit: float,
         level: int = 0,
+        links: Links | None = None,
     ) -> None:
         self.report = report
         self.level = level
         self.bindings = bindings
         self.instancers = instancers
+        self.links = links
         self._metres = np.array([meters_per_unit] * 3 + [1.0])  # of the columns of a matrix
         self._skins = Skins(report)
         self._gprims: list[Gprim] = []
@@ -152,6 +155,7 @@ class GprimReader:
     ) -> Iterator[Draw]:
         """One gprim at all its places, (k, 4, 4) in metres: a draw for each of its materials."""
         self._read_geometry(gprim, code)
+        links = self.links.bits(gprim.prim.GetPath()) if self.links is not None else 0
         for piece in gprim.pieces:
             if piece.geometry is not None:
                 yield Draw(
@@ -160,6 +164,7 @@ class GprimReader:
                     transforms,
                     gprim.double_sided,
                     moving=moving,
+                    links=links,
                 )
 
     def _read_geometry(self, gprim: Gprim, code: Usd.TimeCode) -> None:

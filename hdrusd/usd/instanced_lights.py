@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,18 +12,13 @@ from hdrusd.report import Report
 from hdrusd.scene import CYLINDER, DISK, RECT, light_rows
 from hdrusd.usd.instancer import Copies, mixed
 from hdrusd.usd.light import read_light_row
+from hdrusd.usd.light_controls import light_key
 
 Rows = npt.NDArray[np.void]
 Doubles = npt.NDArray[np.float64]
 
 #: How far a matrix may be from a turn and one scale for all directions, relative.
 _SIMILAR = 1e-6
-
-
-def light_key(prim: Usd.Prim) -> int:
-    """A number of the light by its path, the same in every frame and run."""
-    digest = hashlib.blake2b(str(prim.GetPath()).encode(), digest_size=8).digest()
-    return int.from_bytes(digest, "little", signed=True)
 
 
 def instanced_rows(

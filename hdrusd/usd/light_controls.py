@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +15,7 @@ from hdrusd.report import Kind, Report
 from hdrusd.usd.lux import input_number, input_source
 
 #: Inputs of ShadowAPI that are not physical and not read, and when they change nothing.
-_SHADOW_INPUTS = {
+_SHADOW_INPUTS: dict[str, Any] = {
     "shadow:color": (0.0, 0.0, 0.0),
     "shadow:distance": -1.0,
     "shadow:falloff": -1.0,
@@ -48,8 +49,8 @@ def read_controls(
         rows["shadow"] = 0 if source and source.Get(time) is False else 1
         for name, neutral in _SHADOW_INPUTS.items():
             source = input_source(prim, name)
-            value = source.Get(time) if source else None
-            if value is not None and not np.allclose(np.ravel(value), np.ravel(neutral)):
+            value: Any = source.Get(time) if source else None
+            if value is not None and not np.array_equal(np.ravel(value), np.ravel(neutral)):
                 finding(Kind.DROPPED, "shadow-input", f"inputs:{name} is not used")
     filters = prim.GetRelationship("light:filters")
     if filters and filters.GetTargets():

@@ -87,10 +87,8 @@ def picture(path: str, image: ImageData) -> Picture:
     """The tiles of a decoded image."""
     pixels = image.pixels
     texels = pixels.astype(np.float64)
-    if image.pixels.dtype == np.uint8:
-        texels /= 255.0
-    if image.integers and pixels.shape[2] >= 3:
-        texels **= TEXTURE_GAMMA
+    if pixels.dtype == np.uint8:
+        texels = (texels / 255.0) ** (TEXTURE_GAMMA if pixels.shape[2] >= 3 else 1.0)
     texels = np.repeat(texels[..., :1], 3, axis=2) if pixels.shape[2] < 3 else texels[..., :3]
     texels = np.maximum(np.nan_to_num(texels, posinf=0.0, neginf=0.0), 0.0)
     edges = [np.arange(min(n, TILES) + 1) * n // min(n, TILES) for n in texels.shape[:2]]

@@ -27,7 +27,7 @@ class Links:
         self.report = report
         self._place = SourceRef(Path(stage.GetRootLayer().identifier))
         self._queries: list[Usd.CollectionMembershipQuery] = []
-        self._numbers: dict[tuple[object, ...], int] = {}
+        self._numbers: dict[tuple[tuple[str, str], ...], int] = {}
         self._lights: dict[Sdf.Path, tuple[int, int]] = {}
         self._bits: dict[Sdf.Path, int] = {}
 
@@ -49,9 +49,8 @@ class Links:
     def bits(self, path: Sdf.Path) -> int:
         """``Draw.links`` of the surface at a path."""
         if path not in self._bits:
-            self._bits[path] = sum(
-                1 << index for index, query in enumerate(self._queries) if query.IsPathIncluded(path)
-            )
+            named = [query.IsPathIncluded(path) for query in self._queries]
+            self._bits[path] = sum(1 << index for index, it in enumerate(named) if it)
         return self._bits[path]
 
     def _number(self, prim: Usd.Prim, collection: Usd.CollectionAPI) -> int:
@@ -63,10 +62,10 @@ class Links:
         rules = query.GetAsPathExpansionRuleMap()
         expression = str(collection.GetMembershipExpressionAttr().Get() or "")
         if not rules and expression:
-            key: tuple[object, ...] = (expression, str(prim.GetPath()))
+            key: tuple[tuple[str, str], ...] = ((expression, str(prim.GetPath())),)
         else:
             key = tuple(sorted((str(path), str(rule)) for path, rule in rules.items()))
-            if key == (("/", "expandPrims"),):
+            if ("/", "expandPrims") in key and all(rule == "expandPrims" for _, rule in key):
                 return 0
         if key not in self._numbers:
             if len(self._queries) == MOST_LINKS:

@@ -16,10 +16,15 @@ import numpy.typing as npt
 from pxr import Gf, Usd, UsdGeom, UsdLux
 
 from hdrusd.report import Report
-from hdrusd.scene import light_rows
+from hdrusd.scene import Draw, light_rows
+from hdrusd.usd.bindings import Bindings
 from hdrusd.usd.geometry import GeometryReader
+from hdrusd.usd.gprims import GprimReader
+from hdrusd.usd.instancer import Instancers
+from hdrusd.usd.light import light_time_varying
 from hdrusd.usd.light_controls import light_key, read_controls
 from hdrusd.usd.lux import nits, normalized
+from hdrusd.usd.varying import hides, place_varies
 
 #: Points that stand for a mesh.
 POINTS = 64
@@ -66,6 +71,41 @@ def mesh_light_rows(
     rows["key"] += key
     read_controls(prim, time, rows, report)
     return rows, (float(luminance[0]), float(luminance[1]), float(luminance[2]))
+
+
+class MeshLight:
+    """A mesh that is a light: its rows and what is seen of it, kept unless it varies."""
+
+    def __init__(
+        self, prim: Usd.Prim, bindings: Bindings, meters_per_unit: float, report: Report
+    ) -> None:
+        self.prim = prim
+        self.report = report
+        self.unit = meters_per_unit
+        self.luminance = (0.0, 0.0, 0.0)
+        self.moving = light_time_varying(prim) or place_varies(prim) or hides(prim)
+        self._bindings = bindings
+        self._rows: npt.NDArray[np.void] | None = None
+        self._shape: GprimReader | None = None
+
+    def rows(self, cache: UsdGeom.XformCache) -> npt.NDArray[np.void]:
+        """Its points as ``scene.LIGHT``."""
+        if self._rows is None or self.moving:
+            world = cache.GetLocalToWorldTransform(self.prim)
+            self._rows, self.luminance = mesh_light_rows(
+                self.prim, cache.GetTime(), world, self.unit, self.report
+            )
+        return self._rows
+
+    def draws(self, cache: UsdGeom.XformCache) -> tuple[Draw, ...]:
+        """The mesh in the materials that it wears, which the light's luminance replaces."""
+        if self._shape is None:
+            nothing = Instancers(self.prim.GetStage(), (), self.report)
+            self._shape = GprimReader(
+                self._bindings, nothing, self.report, meters_per_unit=self.unit
+            )
+            self._shape.add(self.prim, cache.GetTime())
+        return self._shape.draws(cache, cache.GetTime())
 
 
 def _triangles(

@@ -157,7 +157,11 @@ def render(
     """One frame of 64 x 48 pixels by shader 1."""
     # Without shadows, unless asked for: the pixels are what the formulas say of them alone.
     renderer = HdrRenderer(
-        gl, Programs(gl), (WIDTH, HEIGHT), load, Options(**{"shadows": False, **options})
+        gl,
+        Programs(gl),
+        (WIDTH, HEIGHT),
+        load,
+        Options(**{"shadows": False, "lights": "exact", **options}),
     )
     renderer.render(scene)
     normal, diffuse, specular, hdr = (

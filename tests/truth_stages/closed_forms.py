@@ -109,20 +109,35 @@ def texture_spaces(_: float) -> Array:
     return np.where(plane()[..., :1] < 0.0, code**2.2, code) * np.full(3, SKY)
 
 
+#: Of the stage instances, m: its lamps; x, y, z and half the sides of its plates, of two kinds.
+LAMPS = ((-1.0, 0.0, 2.0), (1.0, 0.5, 2.0))
+RED = ((-1.0, 0.0, 0.1, 0.25, 0.25), (1.0, 0.5, 0.1, 0.25, 0.25))
+GREY = ((-1.0, -1.0, 0.2, 0.25, 0.25), (0.0, -1.0, 0.2, 0.125, 0.25), (1.0, -1.0, 0.2, 0.25, 0.125))
+
+
+def behind_plates(at: Array, lamp: tuple[float, ...], grow: float = 0.0) -> Array:
+    """(h, w, 1) bool: whether plates, larger by ``grow`` m all around, hide the lamp."""
+    hidden = np.zeros((HEIGHT, WIDTH, 1), bool)
+    way = np.asarray(lamp) - at
+    for x, y, z, w, h in RED + GREY:
+        rise = z - at[0, 0, 2]
+        if rise > 0.0:
+            hit = at + way * rise / way[..., 2:]
+            w, h = w + grow, h + grow
+            hidden |= inside(hit, (x - w, x + w), (y - h, y + h))
+    return hidden
+
+
 def instances(_: float) -> Array:
     def shown(z: float, rho: Array) -> Array:
         at = plane(z)
-        lux = point_lux(at, 400.0, (-1.0, 0.0, 2.0)) + point_lux(at, 400.0, (1.0, 0.5, 2.0))
+        lux = sum(point_lux(at, 400.0, lamp) * ~behind_plates(at, lamp) for lamp in LAMPS)
         return np.asarray(lux * rho / PI)
 
     result = shown(0.0, MATTE)
-    for x, y in ((-1.0, 0.0), (1.0, 0.5)):
-        plate = inside(plane(0.1), (x - 0.25, x + 0.25), (y - 0.25, y + 0.25))
-        result = np.where(plate, shown(0.1, np.array([0.8, 0.1, 0.0])), result)
-    for x, wide, high in ((-1.0, 1.0, 1.0), (0.0, 0.5, 1.0), (1.0, 1.0, 0.5)):
-        w, h = 0.25 * wide, 0.25 * high
-        plate = inside(plane(0.2), (x - w, x + w), (-1.0 - h, -1.0 + h))
-        result = np.where(plate, shown(0.2, MATTE), result)
+    for x, y, z, w, h in RED + GREY:
+        plate = inside(plane(z), (x - w, x + w), (y - h, y + h))
+        result = np.where(plate, shown(z, np.array([0.8, 0.1, 0.0]) if z == 0.1 else MATTE), result)
     return result
 
 
@@ -382,9 +397,9 @@ def png(code: int) -> bytes:
 
 
 def radiance() -> bytes:
-    """A Radiance picture of 32 x 16 pixels: 512 above the horizon, 64 below, all channels."""
-    header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 16 +X 32\n"
-    return header + bytes([128, 128, 128, 138]) * 256 + bytes([128, 128, 128, 135]) * 256
+    """A Radiance picture of 64 x 32 pixels: 512 above the horizon, 64 below, all channels."""
+    header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 32 +X 64\n"
+    return header + bytes([128, 128, 128, 138]) * 1024 + bytes([128, 128, 128, 135]) * 1024
 
 
 def luminaire() -> str:

@@ -215,25 +215,23 @@ def test_a_distant_row_points_to_the_light() -> None:
 
 
 @pytest.mark.parametrize("kind", [UsdLux.DiskLight, UsdLux.RectLight])
-def test_a_flat_light_shines_by_lamberts_cosine_on_one_side(kind: Any) -> None:
+def test_the_shape_of_a_flat_light_has_lamberts_cosine(kind: Any) -> None:
     light = kind.Define(new_stage(), "/Panel")
     report = Report()
     got = row(light.GetPrim(), report=report)
-    assert got["exponent"][0] == 1.0
-    assert got["outer"][0] == pytest.approx(math.pi / 2)
-    assert report.codes() == {"area-light"}
+    assert got["exponent"][0] == 0.0
+    assert got["outer"][0] == NO_CONE
+    assert not report.codes()
 
 
-def test_a_cone_on_a_flat_light_is_the_narrower_one() -> None:
+def test_a_cone_on_a_flat_light_comes_on_top() -> None:
     stage = new_stage()
     light = UsdLux.DiskLight.Define(stage, "/Panel")
     shaping = UsdLux.ShapingAPI.Apply(light.GetPrim())
-    shaping.CreateShapingConeAngleAttr(120.0)
-    assert row(light.GetPrim())["outer"][0] == pytest.approx(math.pi / 2)
-    shaping.GetShapingConeAngleAttr().Set(30.0)
+    shaping.CreateShapingConeAngleAttr(30.0)
     shaping.CreateShapingFocusAttr(2.0)
     assert row(light.GetPrim())["outer"][0] == pytest.approx(math.radians(30.0))
-    assert row(light.GetPrim())["exponent"][0] == 3.0
+    assert row(light.GetPrim())["exponent"][0] == 2.0
 
 
 def test_an_unauthored_cone_is_usdlux_s_ninety_degrees() -> None:
