@@ -15,6 +15,7 @@ from truth_stages.closed_forms import (
     TRUTHS,
     behind_plates,
     document,
+    from_ball,
     luminaire,
     plane,
     png,
@@ -45,6 +46,8 @@ def undecided(name: str) -> np.ndarray:
     at = plane()
     if name == "spot_shadow":
         return np.asarray(shaded(at, EDGE) != shaded(at, -EDGE))[..., 0]
+    if name == "sphere_light":  # the outline of a lamp is that of a polygon
+        return np.asarray(np.abs(from_ball() - 0.6) < 1e-3 * 0.6)[..., 0]
     if name == "instances":
         lit = [
             [behind_plates(plane(z), lamp, grow) for lamp in LAMPS for z in (0.0, 0.1)]

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from hdrusd.gpu.profiles import PROFILE
 from hdrusd.gpu.shadows import shadow_rows
-from hdrusd.photometry.light import inverse_edge, inverse_square
+from hdrusd.photometry.light import inverse_edge, inverse_square, shines_as
 from hdrusd.scene import CYLINDER, DISK, NO_CONE, POINT, RECT, SPHERE, Camera
 
 Floats = npt.NDArray[np.float32]
@@ -29,10 +29,6 @@ _VARYINGS = 31
 _SMALL_BATCHES = (1, 4)
 
 _SHAPES = {SPHERE: "SPHERE", DISK: "DISK", RECT: "RECT", CYLINDER: "CYLINDER"}
-
-#: A ball up to this radius (m) shines as a point does: what it loses where the horizon of
-#: a surface cuts it is below radius / distance of the light at normal incidence.
-SMALL_SPHERE = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,8 +114,7 @@ def _kinds(lights: Lights, extras: Extras | None) -> npt.NDArray[np.str_]:
     local = lights["w"] > 0.0
     focus = (lights["exponent"] > 0.0) & local
     cone = (lights["outer"] < NO_CONE) & local
-    shape = np.where(local, lights["shape"], POINT)
-    shape = np.where((shape == SPHERE) & (lights["radius"] <= SMALL_SPHERE), POINT, shape)
+    shape = shines_as(lights)
     plain = (shape == POINT) & (lights["diffuse"] == 1.0) & (lights["specular"] == 1.0)
     plain &= (lights["link"] == 0) & ~((lights["angle"] > 0.0) & ~local)
     if extras is not None:

@@ -10,7 +10,7 @@ a third of reading a buffer in every pixel. Batches add up by blending.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import moderngl
@@ -104,7 +104,11 @@ class LightPass:
         table = _Table(self.ctx, self._lists.update(scene.lights, merge), scene.camera, extras)
         if not table.classes:
             return
-        bounds = self.tile_bounds(layers, any(shines(m) for m in scene.materials))
+        dielectric = common_dielectric(scene.materials)
+        alike = dielectric is not None and not table.merged
+        bounds = self.tile_bounds(layers, not alike and any(map(shines, scene.materials)))
+        if alike:
+            bounds = replace(bounds, gloss=np.full_like(bounds.gloss, 2))
         regions = self._regions(table, bounds, scene.camera)
         ctx = self.ctx
         frame.use()
@@ -122,9 +126,14 @@ class LightPass:
         for unit, layer in enumerate(layers.values()):
             layer.use(unit)
         table.texture.use(TABLE_UNIT)
+        if dielectric is not None:
+            uniforms["dielectric"] = dielectric
         for region in regions:
-            coated = ("COATED",) if "g_extra" in layers and 2 & region.gloss else ()
-            self._add_classes(table, region, (*_GLOSS[region.gloss], *coated), uniforms, bind)
+            names = list(_GLOSS[region.gloss])
+            if 2 & region.gloss:
+                names += ["COATED"] if "g_extra" in layers else []
+                names += ["DIELECTRIC"] if dielectric is not None else []
+            self._add_classes(table, region, names, uniforms, bind)
         table.texture.release()
         frame.depth_mask = True
         ctx.enable_only(moderngl.NOTHING)
@@ -319,6 +328,23 @@ def shines(material: Material) -> bool:
     values = any(material.specular) or material.metallic > 0.0 or material.clearcoat > 0.0
     maps = (material.specular_map, material.metallic_map, material.clearcoat_map)
     return values or any(use is not None for use in maps)
+
+
+def common_dielectric(materials: Sequence[Material]) -> float | None:
+    """The reflectance at normal incidence that all surfaces have in common, None of metals.
+
+    Most stages leave it at 4 %; then no pixel needs to look it up, and it has no colour.
+    """
+    values = {m.specular for m in materials}
+    plain = all(
+        m.model == "ggx" and m.metallic == 0.0 and m.clearcoat == 0.0
+        and m.specular_map is None and m.metallic_map is None and m.clearcoat_map is None
+        for m in materials
+    )  # fmt: skip
+    if len(values) != 1 or not plain:
+        return None
+    r, g, b = values.pop()
+    return r if r == g == b and r > 0.0 else None
 
 
 def runs(chosen: npt.NDArray[np.bool_], size: tuple[int, int]) -> Ints:

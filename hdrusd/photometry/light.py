@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from hdrusd.scene import POINT, SPHERE
 from hdrusd.units import LUMINANCE_WEIGHTS
 
 RGB = tuple[float, float, float]
@@ -22,6 +23,10 @@ Provenance = Literal["measured", "authored", "estimated"]
 
 #: 1 / rad: the edge of a cone without softness is a millionth of a radian wide.
 HARD_EDGE = 1e6
+
+#: m: a ball up to this radius shines as a point does. What it loses where the horizon of a
+#: surface cuts it is below radius / distance of the light at normal incidence.
+SMALL_SPHERE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +61,12 @@ def chromaticity(color: RGB) -> tuple[RGB, float]:
         return (1.0, 1.0, 1.0), 0.0
     r, g, b = (float(c) / luminance for c in color)
     return (r, g, b), luminance
+
+
+def shines_as(lights: Array) -> npt.NDArray[np.int32]:
+    """(n,) the LIGHT.shape by which lights shine: a small ball, and what is distant, as POINT."""
+    small = (lights["shape"] == SPHERE) & (lights["radius"] <= SMALL_SPHERE)
+    return np.where(small | (lights["w"] == 0.0), POINT, lights["shape"])
 
 
 def angle_from_cosine(cosine: Array) -> Array:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hdrusd.photometry.light import shines_as
 from hdrusd.scene import NO_CONE, POINT, SPHERE
 
 Floats = npt.NDArray[np.float32]
@@ -33,9 +34,6 @@ _FARTHEST, _BRIGHTEST = 1e8, 1e18
 _ONE_PLACE = 1e-6
 
 _AXES = (0, 1, 2)
-
-#: Radius (m) up to which a ball is taken for a point.
-SMALL_BALL = 0.1
 
 #: What has to be the same for two lamps to merge, beside the beam.
 _SAME = ("shape", "link", "shadow", "shadow_link", "diffuse", "specular")
@@ -78,11 +76,10 @@ def may_merge(lights: Lights) -> Bools:
     away or too bright for float32 stays alone too.
     """
     focus, outer = lights["exponent"], lights["outer"]
-    small_ball = (lights["shape"] == SPHERE) & (lights["radius"] <= SMALL_BALL)
     brightest = np.max(lights["intensity"], axis=1, initial=0.0)
     return np.asarray(
         (lights["w"] == 1.0)
-        & ((lights["shape"] == POINT) | small_ball)
+        & (shines_as(lights) == POINT)
         & (lights["profile"] < 0)
         & ((focus == 0.0) | (focus >= 2.0))
         & ((outer <= np.pi) | (outer >= NO_CONE))

@@ -6,13 +6,19 @@ exact, and free of OpenGL.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from hdrusd.photometry.area import (
+    cylinder_illuminance,
+    disk_illuminance,
+    rect_illuminance,
+    sphere_illuminance,
+)
 from hdrusd.photometry.light import (
     cone_factor,
     focus_factor,
@@ -20,6 +26,7 @@ from hdrusd.photometry.light import (
     inverse_edge,
     inverse_square,
     light_vector,
+    shines_as,
 )
 from hdrusd.photometry.microfacet import (
     coat_reflectance,
@@ -31,8 +38,9 @@ from hdrusd.photometry.microfacet import (
     layered,
     schlick_weight,
 )
+from hdrusd.photometry.profile import pack_profiles, profile_candela
 from hdrusd.photometry.reflectance import blinn_phong, half_cosine, lambert
-from hdrusd.scene import NO_CONE, POINT
+from hdrusd.scene import CYLINDER, DISK, POINT, RECT, SPHERE, Profile
 
 Array = npt.NDArray[Any]
 Doubles = npt.NDArray[np.float64]
@@ -62,24 +70,68 @@ class Arrival:
     toward: Array  # (..., 3) unit vector that the highlight takes for the way to the light
 
 
-def point_arrival(light: np.void, surface: Surface) -> Arrival:
-    """A lamp without size, or a distant light: E = I f(theta) cos / d^2."""
-    to_light = light_vector(light["position"], light["w"], surface.position)
-    d2 = np.maximum(np.sum(to_light * to_light, axis=-1), 1e-20)
-    toward = to_light / np.sqrt(d2)[..., None]
-    nl = np.sum(surface.normal * toward, axis=-1)
-    e = illuminance(nl, 1.0 / d2, inverse_square(light["radius"]))
-    if light["outer"] < NO_CONE or light["exponent"] > 0.0:
+def _point(light: np.void, to: Array, normal: Array) -> Array:
+    d2 = np.maximum(np.sum(to * to, axis=-1), 1e-20)
+    cosine = np.sum(normal * to, axis=-1) / np.sqrt(d2)
+    return illuminance(cosine, 1.0 / d2, inverse_square(light["radius"]))
+
+
+def _rect(light: np.void, to: Array, normal: Array) -> Array:
+    return rect_illuminance(to, normal, light["axis"], light["x"], light["y"])
+
+
+def _disk(light: np.void, to: Array, normal: Array) -> Array:
+    return disk_illuminance(to, normal, light["axis"], light["x"], light["y"])
+
+
+def _sphere(light: np.void, to: Array, normal: Array) -> Array:
+    return sphere_illuminance(to, normal, light["radius"])
+
+
+def _cylinder(light: np.void, to: Array, normal: Array) -> Array:
+    return cylinder_illuminance(to, normal, light["x"], light["radius"])
+
+
+#: By LIGHT.shape, lux per candela on the axis from a light in ``to`` (..., 3) m.
+FIELDS: dict[int, Callable[[np.void, Array, Array], Array]] = {
+    POINT: _point,
+    RECT: _rect,
+    DISK: _disk,
+    SPHERE: _sphere,
+    CYLINDER: _cylinder,
+}
+
+
+def arrive(light: np.void, surface: Surface, profiles: Sequence[Profile]) -> Arrival:
+    """What a light gives: E = I f(theta) cos / d^2 of a lamp without size, else by area.py.
+
+    Cone, focus and profile of a light that has a size are those of the direction from its
+    centre, and so is its highlight.
+    """
+    to = light_vector(light["position"], light["w"], surface.position)
+    toward = to / np.sqrt(np.maximum(np.sum(to * to, axis=-1), 1e-20))[..., None]
+    if light["w"] == 0.0 and light["angle"] > 0.0:
+        received = sphere_illuminance(toward, surface.normal, np.sin(light["angle"]))
+    else:
+        received = FIELDS[int(shines_as(light))](light, to, surface.normal)
+    if light["w"] > 0.0:
         cosine = -np.sum(toward * light["axis"], axis=-1)
         edge = inverse_edge(light["inner"], light["outer"])
-        e = e * cone_factor(cosine, light["inner"], edge)
-        e = e * focus_factor(cosine, light["exponent"])
-    lux = light["intensity"] * np.asarray(e)[..., None]
+        received = received * cone_factor(cosine, light["inner"], edge)
+        received = received * focus_factor(cosine, light["exponent"])
+    if light["profile"] >= 0:
+        received = received * _candela(light, toward, profiles[int(light["profile"])])
+    lux = light["intensity"] * np.asarray(received)[..., None]
     return Arrival(lux, lux, toward)
 
 
-#: By LIGHT.shape, how light of that shape arrives.
-ARRIVALS: dict[int, Callable[[np.void, Surface], Arrival]] = {POINT: point_arrival}
+def _candela(light: np.void, toward: Array, profile: Profile) -> Array:
+    """Of the profile in the direction of emission."""
+    sides = (v / np.linalg.norm(v) for v in (light["x"], light["y"]))
+    away = -np.stack([np.sum(toward * v, axis=-1) for v in (*sides, light["axis"])], axis=-1)
+    atlas, placements = pack_profiles([profile])
+    place, grid = placements[0]
+    return profile_candela(atlas, place, grid, away)
 
 
 def shade(
@@ -95,13 +147,15 @@ def shade(
     metallic: Array | float = 0.0,
     coat: Array | tuple[float, float] = (0.0, 1.0),
     links: Array | int = 0,
+    profiles: Sequence[Profile] = (),
 ) -> Doubles:
     """Luminance per channel, (..., 3) cd/m2, that the lights give; emission and ambient apart.
 
     ``position`` (..., 3) m; ``normal`` (..., 3) unit; ``diffuse``, ``specular``
     (..., 3) reflectances; ``gloss`` (...): Blinn-Phong exponent, or minus the alpha of GGX;
-    ``lights`` dtype ``scene.LIGHT``; ``eye`` (3,) m in the same space; ``scale`` 1/pi, or 1
-    for ``petit2010``. ``metallic``, ``coat`` (weight, alpha) and ``links`` as in ``Surface``.
+    ``lights`` dtype ``scene.LIGHT``, with the scene's ``profiles``; ``eye`` (3,) m in the same
+    space, or (..., 3); ``scale`` 1/pi, or 1 for ``petit2010``. ``metallic``, ``coat`` (weight,
+    alpha) and ``links`` as in ``Surface``. Shadows are not part of it.
     """
     view = eye - position
     view = view / np.linalg.norm(view, axis=-1, keepdims=True)
@@ -119,7 +173,7 @@ def shade(
     )
     total = np.zeros(np.shape(position), np.float64)
     for light in lights:
-        arrival = ARRIVALS[int(light["shape"])](light, surface)
+        arrival = arrive(light, surface, profiles)
         total += reached(light, surface)[..., None] * reflect(
             surface,
             arrival,

@@ -188,8 +188,8 @@ def _ring() -> Doubles:
     """(SIDES + 1, 2) corners of the polygon that has the area of the unit circle, closed."""
     turn = np.linspace(0.0, 2.0 * np.pi, SIDES + 1)
     step = 2.0 * np.pi / SIDES
-    fit = np.sqrt(step / np.sin(step))
-    return fit * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    fit = float(np.sqrt(step / np.sin(step)))
+    return np.asarray(fit * np.stack([np.cos(turn), np.sin(turn)], axis=1))
 
 
 def _disk() -> Geometry:
@@ -204,7 +204,7 @@ def _band(name: str, rings: Doubles, normals: Doubles) -> Geometry:
 
     def corners(grid: Doubles) -> Doubles:
         a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
-        return np.stack([a, c, b, a, d, c], axis=2).reshape(-1, 3)
+        return np.stack([a, b, c, a, c, d], axis=2).reshape(-1, 3)
 
     return _geometry(name, corners(rings), corners(normals))
 

@@ -1,10 +1,11 @@
 """Mesh lights: ``mesh_light_rows``, points spread over a mesh with MeshLightAPI.
 
-``POINTS`` points of equal share, stratified by area and the same in every frame, each a
-Lambertian point that shines on the front of the mesh. Error against the exact light, for a
-flat square (tests/usd/test_mesh_light.py): 1 % from one width away, 3 % at half a width, and
-nearer the points show. The colour is that of the light's inputs: a bound material's own glow
-does not tint it (``light:materialSyncMode``).
+About ``POINTS`` Lambertian points that shine on the front of the mesh, the same in every
+frame: of a mesh of no more triangles, the centroids of the equal parts into which each is cut;
+of a larger one, the middles of triangles picked at equal steps of the area. Error against the
+exact light, for a flat square (tests/usd/test_mesh_light.py): 1 % from one width away, 3 % at
+half a width, and nearer the points show. The colour is that of the light's inputs: the glow of
+a bound material does not tint it (``light:materialSyncMode``).
 """
 
 from __future__ import annotations
@@ -26,11 +27,8 @@ from hdrusd.usd.light_controls import light_key, read_controls
 from hdrusd.usd.lux import nits, normalized
 from hdrusd.usd.varying import hides, place_varies
 
-#: Points that stand for a mesh.
+#: Points that stand for a mesh; up to 144 where its triangles are few and uneven.
 POINTS = 64
-
-#: Steps of the R2 sequence (Roberts 2018): powers of the plastic number.
-_R2 = np.array([0.7548776662466927, 0.5698402909980532])
 
 
 def is_mesh_light(prim: Usd.Prim) -> bool:
@@ -45,7 +43,7 @@ def mesh_light_rows(
     meters_per_unit: float,
     report: Report,
 ) -> tuple[npt.NDArray[np.void], tuple[float, float, float]]:
-    """(POINTS,) ``scene.LIGHT``, none for a mesh without area; and its luminance, cd/m2.
+    """(n,) ``scene.LIGHT``, none for a mesh without area; and its luminance, cd/m2.
 
     With ``normalize`` the luminance is divided by the area in scene units, as of all lights.
     """
@@ -58,17 +56,17 @@ def mesh_light_rows(
     if not (0.0 < area < math.inf):
         return light_rows(0), (0.0, 0.0, 0.0)
     luminance = np.asarray(nits(prim, time)) / (area if normalized(prim, time) else 1.0)
-    key = light_key(prim)
-    chosen, weights = _spread(areas / area, np.random.default_rng(key & 0xFFFFFFFF))
-    rows = light_rows(POINTS)
+    chosen, weights, shares = _spread(areas / area)
+    rows = light_rows(len(chosen))
     square_metres = area * meters_per_unit**2
     rows["position"] = np.einsum("nk,nkj->nj", weights, triangles[chosen]) * meters_per_unit
-    rows["axis"] = turn[chosen] / (2.0 * areas[chosen])[:, None]
-    rows["intensity"] = luminance * square_metres / POINTS
-    rows["radius"] = math.sqrt(square_metres / POINTS / math.pi)
+    rows["axis"] = turn[chosen] / np.maximum(2.0 * areas[chosen], 1e-300)[:, None]
+    rows["intensity"] = luminance * (shares * square_metres)[:, None]
+    # No nearer than this is a point's light that of its part.
+    rows["radius"] = np.sqrt(shares * square_metres / math.pi)
     rows["exponent"] = 1.0
     rows["inner"] = rows["outer"] = math.pi / 2
-    rows["key"] += key
+    rows["key"] += light_key(prim)
     read_controls(prim, time, rows, report)
     return rows, (float(luminance[0]), float(luminance[1]), float(luminance[2]))
 
@@ -120,19 +118,27 @@ def _triangles(
 
 
 def _spread(
-    shares: npt.NDArray[np.float64], generator: np.random.Generator
-) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.float64]]:
-    """Triangles (n,) and barycentric weights (n, 3) of ``POINTS`` points.
+    shares: npt.NDArray[np.float64],
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Triangles (n,), barycentric weights (n, 3) and shares of the area (n,) of the points."""
+    if len(shares) > POINTS:
+        along = (np.arange(POINTS) + 0.5) / POINTS
+        chosen = np.minimum(np.searchsorted(np.cumsum(shares), along), len(shares) - 1)
+        return chosen, np.full((POINTS, 3), 1.0 / 3.0), np.full(POINTS, 1.0 / POINTS)
+    cuts = np.maximum(np.rint(np.sqrt(POINTS * shares)), 1.0).astype(np.int64)
+    parts = []
+    for m in np.unique(cuts):
+        members, inside = np.flatnonzero(cuts == m), _centroids(int(m))
+        chosen = np.repeat(members, len(inside))
+        parts.append((chosen, np.tile(inside, (len(members), 1)), shares[chosen] / m**2))
+    chosen, weights, share = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return chosen, weights, share
 
-    Every point has the same share of the area; those of one triangle lie in it by the R2
-    sequence, which fills a square evenly, folded onto it.
-    """
-    ends = np.cumsum(shares)
-    along = (np.arange(POINTS) + 0.5) / POINTS
-    chosen = np.minimum(np.searchsorted(ends, along), len(shares) - 1)
-    first = np.searchsorted(chosen, chosen)  # of the points in the same triangle
-    step = np.arange(POINTS) - first
-    u, v = ((generator.random(2) + step[:, None] * _R2) % 1.0).T
-    outside = u + v > 1.0
-    u, v = np.where(outside, 1.0 - u, u), np.where(outside, 1.0 - v, v)
-    return chosen, np.stack([1.0 - u - v, u, v], axis=1)
+
+def _centroids(m: int) -> npt.NDArray[np.float64]:
+    """(m^2, 3) barycentric centroids of the equal triangles that cut each side in m."""
+    i, j = np.divmod(np.arange(m * m), m)
+    up, down = i + j <= m - 1, i + j <= m - 2
+    u = np.concatenate([i[up] + 1 / 3, i[down] + 2 / 3]) / m
+    v = np.concatenate([j[up] + 1 / 3, j[down] + 2 / 3]) / m
+    return np.stack([1.0 - u - v, u, v], axis=1)

@@ -27,7 +27,7 @@ DASH = 3.0  # m, dash and gap of the centre line
 WATER = 0.004  # m that a puddle stands above the road
 
 #: Strips where water stands, x from and to: the gutters, the wheel tracks of both lanes.
-_HOLLOWS = ((-5.42, -4.9), (-3.0, -2.1), (-1.3, -0.35), (0.35, 1.3), (2.1, 3.0), (4.9, 5.42))
+_HOLLOWS = ((-5.42, -4.9), (-2.9, -2.2), (-1.1, -0.4), (0.4, 1.1), (2.2, 2.9), (4.9, 5.42))
 
 
 def _carriageway(kit: Kit) -> None:
@@ -52,22 +52,23 @@ def _carriageway(kit: Kit) -> None:
 
 
 def _puddles(kit: Kit) -> None:
-    """Puddles between the markings, longer than wide, a fan of triangles each."""
+    """Water in the hollows between the markings: long strips with smooth, wandering edges."""
     rng = np.random.default_rng(400)
-    turn = np.linspace(0.0, 2.0 * np.pi, 25)
+    along = np.linspace(0.0, 1.0, 25)
     for low, high in _HOLLOWS:
-        y = rng.uniform(2.0, 8.0)
-        while y < LENGTH - 4.0:
-            half = rng.uniform(0.8, 2.6)  # m along the street
-            phase, waves = rng.uniform(0.0, 2.0 * np.pi, 3), np.array((2, 3, 5))
-            ragged = 1.0 + np.sin(waves[:, None] * turn + phase[:, None]).T @ (0.10, 0.08, 0.05)
-            x = (low + high) / 2.0 + ragged * np.cos(turn) * (high - low) / 2.46
-            points = np.stack((x, y + ragged * half * np.sin(turn), np.full(25, WATER)), axis=1)
-            middle = np.array(((low + high) / 2.0, y, WATER))
-            if not STOP_LINES[0][0] - 3.0 < y < STOP_LINES[1][0] + 3.5:
-                fan = (np.broadcast_to(middle, (24, 3)), points[:-1], points[1:])
-                kit["Puddle"].faces(np.stack(fan, axis=1))
-            y += 1.3 * half + rng.uniform(3.0, 12.0)
+        y = rng.uniform(1.0, 4.0)
+        while (end := y + rng.uniform(4.0, 14.0)) < LENGTH - 1.0:
+            if end < STOP_LINES[0][0] - 0.5 or y > STOP_LINES[1][0] + 1.0:
+                bulge = np.sqrt(along * (1.0 - along)) * 2.0
+                phase = rng.uniform(0.0, 2.0 * np.pi, 2)
+                sway = np.sin(np.multiply.outer((5.0, 11.0), along) + phase[:, None])
+                half = bulge * (high - low) * (0.33 + 0.06 * sway[0] + 0.03 * sway[1])
+                middle = (low + high) / 2.0 + bulge * (high - low) * 0.06 * sway[1]
+                ys, level = y + along * (end - y), np.full(25, WATER)
+                sides = [np.stack((x, ys, level), axis=1) for x in (middle - half, middle + half)]
+                strip = np.stack((sides[0][:-1], sides[1][:-1], sides[1][1:], sides[0][1:]), axis=1)
+                kit["Puddle"].faces(strip)
+            y = end + rng.uniform(1.0, 9.0)
 
 
 def _flat(

@@ -67,9 +67,9 @@ _PALACE = Building(
     "mansard", lit=0.28,
 )  # fmt: skip
 
-#: y of the shopfronts on the right that are lit from above: those of a bookseller, a hotel
-#: and a chemist, no awning before them.
-_SHOPS_LIT = (18.0, 22.0, 30.0, 34.0, 50.0, 54.0)
+#: y of the shopfronts on the right that are lit from above: those of a hotel, a chemist and
+#: a coffee house, no awning before them.
+_SHOPS_LIT = (30.0, 34.0, 50.0, 54.0, 98.0, 102.0)
 
 #: Parked cars: y, design, paint. On the right they head +Y, on the left -Y.
 _PARKED_RIGHT: tuple[tuple[float, Design, str], ...] = (

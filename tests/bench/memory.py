@@ -3,9 +3,8 @@
 A stage in which everything moves that can: a car with headlights, a walking figure of joints,
 a cloth whose number of faces changes, lamps that are switched, a profile that opens and
 closes, an area light and a sky that turns. Every hundred frames the resident memory of the
-process is noted, and the numbers that OpenGL gives to the next buffer, texture, vertex array
-and framebuffer: a driver hands out the lowest number that is free, so they stay what they
-are unless something is left behind.
+process is noted, how many buffers, textures, vertex arrays, framebuffers and programs it holds,
+and how many of them were forgotten without being released, which OpenGL would keep for ever.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ import gc
 import math
 import os
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -28,6 +28,13 @@ from hdrusd.render import Job, render_sequence
 from hdrusd.report import Report
 
 EVERY = 100
+KINDS = (
+    moderngl.Buffer,
+    moderngl.Texture,
+    moderngl.VertexArray,
+    moderngl.Framebuffer,
+    moderngl.Program,
+)
 LAMPS = 80  # more than are drawn one by one
 
 _LUMINAIRE = """IESNA:LM-63-2002
@@ -211,27 +218,27 @@ def resident() -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
-def next_names(ctx: moderngl.Context) -> tuple[int, ...]:
-    """What OpenGL calls the next buffer, texture, vertex array and framebuffer."""
-    buffer = ctx.buffer(reserve=16)
-    texture = ctx.texture((1, 1), 4)
-    program = ctx.program(
-        vertex_shader="#version 330\nin vec4 p; void main() { gl_Position = p; }",
-        fragment_shader="#version 330\nout vec4 c; void main() { c = vec4(1.0); }",
+def held() -> tuple[int, ...]:
+    """How many of each of ``KINDS`` there are that were not released."""
+    living = Counter(
+        type(thing)
+        for thing in gc.get_objects()
+        if isinstance(thing, KINDS) and not isinstance(thing.mglo, moderngl.InvalidObject)
     )
-    vao = ctx.vertex_array(program, [(buffer, "4f", "p")])
-    frame = ctx.framebuffer([texture])
-    names = buffer.glo, texture.glo, vao.glo, frame.glo
-    for thing in (frame, vao, program, texture, buffer):
-        thing.release()
-    return names
+    return tuple(living[kind] for kind in KINDS)
 
 
-def watch(frames: int, size: tuple[int, int]) -> Iterator[tuple[int, float, tuple[int, ...]]]:
-    """(frame, MiB, ``next_names``) every ``EVERY`` frames."""
+def forgotten(ctx: moderngl.Context) -> int:
+    """How many objects were collected without having been released."""
+    return sum(not isinstance(thing, moderngl.InvalidObject) for thing in ctx.objects)
+
+
+def watch(frames: int, size: tuple[int, int]) -> Iterator[tuple[int, float, tuple[int, ...], int]]:
+    """(frame, MiB, ``held``, forgotten) every ``EVERY`` frames."""
     with tempfile.TemporaryDirectory() as folder:
         stage = write_stage(Path(folder), frames)
         ctx = create_context()
+        ctx.gc_mode = "context_gc"  # what is forgotten is noted, and not freed
         job = Job(
             stage,
             [float(t) for t in range(frames)],
@@ -244,7 +251,7 @@ def watch(frames: int, size: tuple[int, int]) -> Iterator[tuple[int, float, tupl
         for number, _ in enumerate(render_sequence(ctx, job, report), 1):
             if number % EVERY == 0 or number == 1:
                 gc.collect()
-                yield number, resident(), next_names(ctx)
+                yield number, resident(), held(), forgotten(ctx)
         print(f"findings: {', '.join(sorted(report.codes())) or 'none'}")
 
 
@@ -254,10 +261,11 @@ def main() -> None:
     parser.add_argument("frames", nargs="?", type=int, default=1000)
     parser.add_argument("--size", nargs=2, type=int, default=(160, 90), metavar=("W", "H"))
     options = parser.parse_args()
-    print("| frame | resident MiB | next buffer, texture, vertex array, framebuffer |")
-    print("| --- | --- | --- |")
-    for number, memory, names in watch(options.frames, tuple(options.size)):
-        print(f"| {number} | {memory:.0f} | {', '.join(map(str, names))} |", flush=True)
+    columns = ["frame", "resident MiB", *(kind.__name__ for kind in KINDS), "forgotten"]
+    print(f"| {' | '.join(columns)} |\n| {' | '.join(['---'] * len(columns))} |")
+    for number, memory, counts, lost in watch(options.frames, tuple(options.size)):
+        row = map(str, (number, round(memory), *counts, lost))
+        print(f"| {' | '.join(row)} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -218,9 +218,17 @@ def disk_light(_: float) -> Array:
     return np.asarray(3000.0 * share * MATTE)
 
 
+def from_ball() -> Array:
+    """(h, w, 1) m between the pixels' rays and the middle of sphere_light's lamp."""
+    ray = plane() - np.array([0.0, 0.0, 4.0])
+    way = np.cross(ray, np.array([0.3, -0.2, 0.7 - 4.0]))
+    return np.asarray(np.linalg.norm(way, axis=-1) / np.linalg.norm(ray, axis=-1))[..., None]
+
+
 def sphere_light(_: float) -> Array:
-    """E = pi L (r / d)^2 cos: the same as of a point of L pi r^2 candela, however near."""
-    return point_lux(plane(), 1000.0 * PI * 0.6**2, (0.3, -0.2, 0.7)) * MATTE / PI
+    """E = pi L (r / d)^2 cos, as of a point of L pi r^2 candela; L where the ball is seen."""
+    ground = point_lux(plane(), 1000.0 * PI * 0.6**2, (0.3, -0.2, 0.7)) * MATTE / PI
+    return np.where(from_ball() < 0.6, 1000.0, ground)
 
 
 def photometric_file(_: float) -> Array:
@@ -329,7 +337,9 @@ TRUTHS: Mapping[str, Truth] = {
     ),
     "rect_light": Truth(rect_light, ("area light", "rect")),
     "disk_light": Truth(disk_light, ("area light", "disk")),
-    "sphere_light": Truth(sphere_light, ("area light", "sphere")),
+    "sphere_light": Truth(
+        sphere_light, ("area light", "sphere", "seen"), ((8, 8), (37, 27), (55, 12), (55, 40))
+    ),
     "photometric_file": Truth(photometric_file, ("IES LM-63", "candela multiplier", "type C")),
     "spot_shadow": Truth(
         spot_shadow, ("spot light", "shadow", "cube"), ((8, 8), (32, 24), (42, 30), (55, 40))

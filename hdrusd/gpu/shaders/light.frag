@@ -10,6 +10,9 @@ flat in vec4 data[FIRST * ROWS + CONED * 3];
 layout(location = 0) out vec4 hdr;
 
 uniform float lambert_scale;  // 1/pi, or 1 for petit2010
+#if defined(LINKED) || defined(COATED)
+uniform sampler2D g_extra;    // clear coat: weight, alpha; light links
+#endif
 
 // What of a surface every light needs.
 struct Surface {
@@ -67,7 +70,11 @@ struct Arrival {
 // What reflection a tile has: none but diffuse, BLINN, GGX, or both.
 vec3 sum = vec3(0.0);    // lux that diffuse reflection gets
 vec3 gloss = vec3(0.0);  // cd/m2 of highlights
-#if defined(GGX)
+#if defined(DIELECTRIC)
+uniform float dielectric;  // reflectance at normal incidence of all there is, none of it metal
+float ks, f90;
+float alpha2, gain;
+#elif defined(GGX)
 vec3 ks, f90;
 float alpha2, gain;
 #ifdef COATED
@@ -82,7 +89,11 @@ void reflect_light(Surface s, Arrival a)
 #if defined(GGX)
     vec2 half_way = half_angles(s.n, a.l, s.v, a.nl, s.nv);
     float weight = schlick_weight(half_way.y);
+#ifdef DIELECTRIC
+    float f = ks + (f90 - ks) * weight;
+#else
     vec3 f = fresnel(ks, f90, weight);
+#endif
     float lobe = ggx_lobe(gain, alpha2, a.nl, half_way.x);
 #ifdef BLINN
     bool blinn = s.gloss >= 0.0;
@@ -90,10 +101,14 @@ void reflect_light(Surface s, Arrival a)
     lobe = blinn ? blinn_phong(nh, s.gloss, lambert_scale) : lobe;
     vec3 below = blinn ? vec3(1.0) : 1.0 - f;
     f = blinn ? ks : f;
+#elif defined(DIELECTRIC)
+    float below = 1.0 - f, shine = f * lobe;
 #else
     vec3 below = 1.0 - f;
 #endif
+#ifndef DIELECTRIC
     vec3 shine = f * lobe;
+#endif
 #ifdef COATED
     float c = coat_reflectance(coat, weight);
     below *= 1.0 - c;
@@ -139,12 +154,17 @@ void main()
     vec4 extra = textureLod(g_extra, window, 0.0);
     s.links = extra.z;
 #endif
-#if defined(BLINN) || defined(GGX)
+#if defined(DIELECTRIC)
+    ks = dielectric;
+    f90 = grazing_reflectance(vec3(dielectric), 0.0).r;
+#elif defined(BLINN) || defined(GGX)
     vec4 specular = textureLod(g_specular, window, 0.0);
     ks = specular.rgb;
-#endif
 #ifdef GGX
     f90 = grazing_reflectance(ks, specular.w);
+#endif
+#endif
+#ifdef GGX
     alpha2 = s.gloss * s.gloss;
     gain = ggx_gain(s.nv, alpha2, lambert_scale);
 #ifdef COATED

@@ -2,7 +2,7 @@
 // position, w | intensity, 1/radius^2 | axis, exponent | x, inner | y, 1/width | factor on
 // diffuse, factor on specular, link, radius (of a distant light: tangent of half its angle);
 // then those of its shadow (SHADOW_ROWS), then those of its profile.
-#if defined(RECT) || defined(DISK) || defined(SPHERE) || defined(CYLINDER)
+#if defined(RECT) || defined(DISK) || defined(SPHERE) || defined(CYLINDER) || defined(DISTANT)
 #include "photometry/area.glsl"
 #endif
 #ifdef SHADOWED
@@ -54,6 +54,8 @@ Arrival special_arrival(Surface s, int at)
     float received = sphere_illuminance(to, s.n, more.w);
 #elif defined(CYLINDER)
     float received = cylinder_illuminance(to, s.n, x.xyz, more.w);
+#elif defined(DISTANT)
+    float received = sphere_illuminance(a.l, s.n, more.w * inversesqrt(1.0 + more.w * more.w));
 #else
     float received = illuminance(a.nl, inverse_d * inverse_d, candela.w);
 #endif
