@@ -146,6 +146,7 @@ def SphereLight "Lamp"
 {
     float inputs:intensity = 127323.954
     float inputs:radius = 0.05
+    bool treatAsPoint = 1
     token visibility.timeSamples = { 1: "invisible", 2: "inherited" }
     double3 xformOp:translate = (0, 0, 2)
     uniform token[] xformOpOrder = ["xformOp:translate"]

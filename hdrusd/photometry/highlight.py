@@ -1,21 +1,23 @@
 """Highlights of area lights by a representative point.
 
-Luminance of a highlight = f(l) E w: the lobe f of the surface towards the point of the light
+Luminance of a highlight = f(l) E g: the lobe f of the surface towards the point of the light
 that is nearest to the reflected ray (Karis 2013, Real Shading in Unreal Engine 4), the
-exact illuminance E of area.py, and the share w by which the light widens the lobe. Karis adds
-half the light's angle to alpha, which loses half of the highlight where both are equal. Here
-their squares add, as variances do, each direction for itself: a light of half sides or radii
-x, y moves the half vector by u = (I - h h^T) x / (d |l + v|) and so on, and
+exact illuminance E of area.py, and ``highlight_share`` g. It holds the share w by which the
+light widens the lobe. Karis adds half the light's angle to alpha, which loses half of the
+highlight where both are equal. Here their squares add, as variances do, each direction for
+itself: half sides or radii x, y of the light move the half vector h by u and by z,
+u = (I - h h^T) x / (d |l + v|), and
 
-    w = alpha^2 / sqrt(det(alpha^2 I + k (u u^T + w w^T)))
-      = 1 / sqrt(1 + k (u^2 + w^2) / alpha^2 + k^2 |u x w|^2 / alpha^4)
+    w = alpha^2 / sqrt(det(alpha^2 I + k (u u^T + z z^T)))
+      = 1 / sqrt(1 + k (u^2 + z^2) / alpha^2 + k^2 |u x z|^2 / alpha^4)
 
-with k = 1 for an ellipse and 4/pi for a rectangle, so that a mirror shows the light's own
-luminance. Error against integration of the GGX lobe, for a light up to 0.4 rad from its
-centre and N.V down to 0.42 (tests/facts/test_highlight.py), where the mirror's direction
-meets the light's middle: 25 %, and 5 % for a light below 0.1 rad at alpha >= 0.25; at its rim
-and beside it, where the highlight falls off, up to a factor of 2. Blinn's and Phong's lobe of
-the exponent n counts as alpha^2 = 2 / (n + 2). A distant light is a sphere in the distance 1.
+with k = 1 for an ellipse and 4/pi for straight sides, so that a mirror shows the light's own
+luminance. Error against integration of the GGX lobe, alpha from 0.01 to 1, lights of up to 1
+rad across, N.V from 1 to 0.4 (tests/facts/test_highlight.py): where the reflected ray meets
+the middle of the light 20 %, beside it at most half of that peak. Blinn's and Phong's lobe of
+the exponent n counts as alpha^2 = 2 / (n + 2). A distant light of half angle a is a sphere of
+the radius sin(a) in the distance 1.
+
 Twin of ``highlight.glsl``. Vectors (..., 3), in metres; p from the surface to the centre of
 the light, r the reflected ray and v the way to the eye (unit), the rest as in area.py.
 """
@@ -84,17 +86,17 @@ def cylinder_point(p: Array, r: Array, x: Array, radius: Array) -> Array:
 
 
 def spread(p: Array, v: Array, x: Array, y: Array) -> Array:
-    """(..., 2) u^2 + w^2 and |u x w|^2 of a flat light, k = 1."""
+    """(..., 2) u^2 + z^2 and |u x z|^2 of a flat light; y of a cylinder is its radius, across."""
     inverse = 1.0 / np.sqrt(np.maximum(dot(p, p), 1e-20))
-    both = p * inverse[..., None] + v
+    way = p * inverse[..., None]
+    both = way + v
     size2 = np.maximum(dot(both, both), 1e-6)
-    l = p * inverse[..., None]  # noqa: E741 (the way to the light)
-    u, w = x - l * dot(x, l)[..., None], y - l * dot(y, l)[..., None]
+    u, z = x - way * dot(x, way)[..., None], y - way * dot(y, way)[..., None]
     u = u - both * (dot(u, both) / size2)[..., None]
-    w = w - both * (dot(w, both) / size2)[..., None]
+    z = z - both * (dot(z, both) / size2)[..., None]
     scale = inverse * inverse / size2
-    uu, ww, uw = dot(u, u) * scale, dot(w, w) * scale, dot(u, w) * scale
-    return np.stack([uu + ww, np.maximum(uu * ww - uw * uw, 0.0)], axis=-1)
+    turn = np.cross(u, z) * scale[..., None]
+    return np.stack([(dot(u, u) + dot(z, z)) * scale, dot(turn, turn)], axis=-1)
 
 
 def sphere_spread(p: Array, v: Array, radius: Array) -> Array:
@@ -111,6 +113,15 @@ def lobe_share(area: Array, k: float, alpha2: Array) -> Array:
     """w: by what a lobe of alpha^2 is lower, for what ``spread`` gives."""
     first, second = k * area[..., 0], k * k * area[..., 1]
     return np.asarray(1.0 / np.sqrt(1.0 + (first + second / alpha2) / alpha2))
+
+
+def highlight_share(share: Array, nl: Array, middle: Array) -> Array:
+    """G from w: the narrower the lobe, the more the representative point's cosine counts.
+
+    ``nl``: N.L of the representative point, ``middle``: of the light's centre, in which E is.
+    """
+    raised = np.clip(np.maximum(nl, 0.0) / np.maximum(middle, 1e-3), 0.0, 4.0)
+    return np.asarray(share * (1.0 + (raised - 1.0) * (1.0 - share)))
 
 
 def blinn_alpha2(shininess: Array) -> Array:

@@ -63,7 +63,7 @@ def chromaticity(color: RGB) -> tuple[RGB, float]:
     return (r, g, b), luminance
 
 
-def shines_as(lights: Array) -> npt.NDArray[np.int32]:
+def shines_as(lights: npt.NDArray[np.void] | np.void) -> npt.NDArray[np.int32]:
     """(n,) the LIGHT.shape by which lights shine: a small ball, and what is distant, as POINT."""
     small = (lights["shape"] == SPHERE) & (lights["radius"] <= SMALL_SPHERE)
     return np.where(small | (lights["w"] == 0.0), POINT, lights["shape"])

@@ -19,8 +19,8 @@ a normalised area counts in scene units, as read here, or in square metres is op
 (OpenUSD pull request 3587); with metersPerUnit = 1 both are the same.
 
 ``treatAsPoint`` and ``treatAsLine`` do not change the number. The multipliers
-``inputs:diffuse`` and ``inputs:specular``, light filters and colour spaces other
-than linear Rec. 709 are not read.
+``inputs:diffuse`` and ``inputs:specular`` are read by usd/light_controls.py; light filters and
+colour spaces other than linear Rec. 709 are not read.
 """
 
 from __future__ import annotations

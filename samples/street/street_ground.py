@@ -52,23 +52,23 @@ def _carriageway(kit: Kit) -> None:
 
 
 def _puddles(kit: Kit) -> None:
-    """Water in the hollows between the markings: long strips with smooth, wandering edges."""
+    """Water in the gutters and the wheel tracks: long strips with smooth, wandering edges."""
     rng = np.random.default_rng(400)
-    along = np.linspace(0.0, 1.0, 25)
+    along = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 33))  # close together at the ends
     for low, high in _HOLLOWS:
         y = rng.uniform(1.0, 4.0)
-        while (end := y + rng.uniform(4.0, 14.0)) < LENGTH - 1.0:
+        while (end := y + rng.uniform(5.0, 18.0)) < LENGTH - 1.0:
             if end < STOP_LINES[0][0] - 0.5 or y > STOP_LINES[1][0] + 1.0:
-                bulge = np.sqrt(along * (1.0 - along)) * 2.0
+                bulge = np.sqrt(1.0 - np.abs(2.0 * along - 1.0) ** 5)
                 phase = rng.uniform(0.0, 2.0 * np.pi, 2)
                 sway = np.sin(np.multiply.outer((5.0, 11.0), along) + phase[:, None])
-                half = bulge * (high - low) * (0.33 + 0.06 * sway[0] + 0.03 * sway[1])
-                middle = (low + high) / 2.0 + bulge * (high - low) * 0.06 * sway[1]
-                ys, level = y + along * (end - y), np.full(25, WATER)
+                half = bulge * (high - low) * (0.24 + 0.05 * sway[0] + 0.03 * sway[1])
+                middle = (low + high) / 2.0 + bulge * (high - low) * 0.05 * sway[0]
+                ys, level = y + along * (end - y), np.full(33, WATER)
                 sides = [np.stack((x, ys, level), axis=1) for x in (middle - half, middle + half)]
                 strip = np.stack((sides[0][:-1], sides[1][:-1], sides[1][1:], sides[0][1:]), axis=1)
                 kit["Puddle"].faces(strip)
-            y = end + rng.uniform(1.0, 9.0)
+            y = end + rng.uniform(0.5, 7.0)
 
 
 def _flat(

@@ -214,12 +214,12 @@ def _traffic() -> list[Node]:
 
 def _views() -> list[Node]:
     """The cameras that stand still."""
-    overview, low = turn("x", 88.0), compose(turn("z", 1.5), turn("x", 91.0))
+    overview, low = turn("x", 88.0), compose(turn("z", -1.0), turn("x", 88.0))
     arcade = compose(turn("z", -4.0), turn("x", 91.0))
     return [
         Node("Overview", "matrix", (0.8, 3.0, 6.0), overview, camera=Camera(50.0)),
         Node("ArcadeWalk", "matrix", (-11.2, 2.0, 1.75), arcade, camera=Camera(60.0)),
-        Node("WetRoad", "matrix", (0.3, 58.0, 0.45), low, camera=Camera(45.0)),
+        Node("WetRoad", "matrix", (-0.6, 57.0, 1.0), low, camera=Camera(32.0)),
     ]
 
 

@@ -132,6 +132,8 @@ class Rendered:
     shininess: Array  # or the code of GGX
     specular: Array
     metallic: Array
+    coat: Array  # weight and alpha of a clear coat
+    links: Array  # bits
 
 
 def rays(camera: Camera, size: tuple[int, int] = (WIDTH, HEIGHT)) -> tuple[Array, Array]:
@@ -168,6 +170,10 @@ def render(
         renderer.layer(name).astype(np.float64)
         for name in ("g_normal", "g_diffuse", "g_specular", "hdr")
     )
+    try:
+        extra = renderer.layer("g_extra").astype(np.float64)
+    except KeyError:  # nothing in the scene needs it
+        extra = np.broadcast_to([0.0, 1.0, 0.0, 0.0], hdr.shape)
     gl.extra["framebuffer"].use()
     origins, directions = rays(scene.camera)
     return Rendered(
@@ -179,6 +185,8 @@ def render(
         shininess=diffuse[..., 3],
         specular=specular[..., :3],
         metallic=specular[..., 3],
+        coat=extra[..., :2],
+        links=extra[..., 2].astype(np.int64),
     )
 
 

@@ -70,7 +70,7 @@ def test_a_box_is_seen_through_its_open_side() -> None:
 
 def test_a_stage_with_nothing_to_draw_is_refused(gl: Any, tmp_path: Path) -> None:
     path = tmp_path / "lights.usda"
-    path.write_text('#usda 1.0\n( metersPerUnit = 1 )\ndef SphereLight "Lamp" {}\n')
+    path.write_text('#usda 1.0\n( metersPerUnit = 1 )\ndef DistantLight "Sun" {}\n')
     renderer = Renderer(gl, Job(path, width=8, height=8), Report())
     with pytest.raises(InputError, match="nothing to draw"):
         renderer.frame(0.0)
