@@ -15,6 +15,8 @@ from pathlib import Path
 
 import click
 
+from hdrusd.convert import Options, convert
+
 HERE = Path(__file__).parent
 
 
@@ -38,6 +40,11 @@ def main(lights: str, size: str, rounds: int, frames: int, seq: int, exact: bool
         if not maker.is_file():
             raise click.UsageError(f"{peers}: no peers; {bench / 'README.md'} says how to install")
         subprocess.run([str(maker), str(bench / "make_scene.py"), str(scene)], check=True)
+    for count in lights.split(","):
+        stage = scene / "hdrusd" / f"street_{count}.usda"
+        if not stage.is_file():
+            stage.parent.mkdir(exist_ok=True)
+            convert(scene / f"street_{count}.glb", stage, Options())
     jobs = []
     for mode in ("auto", "exact") if exact else ("auto",):
         script = f"{sys.executable} {HERE / 'street_peer.py'} --mode {mode}"

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from hdrusd.display import Writer
 from hdrusd.gpu.context import create_context, describe
 from hdrusd.images import write_exr
 from hdrusd.render import Job, Renderer
@@ -33,7 +34,8 @@ def main() -> None:
 
     arguments = common.args(more)
     size = arguments.width, arguments.height
-    stage = Path(arguments.scene) / f"street_{arguments.lights}.usdc"
+    # Converted from the glTF file that the peers read, so that the same faces are culled.
+    stage = Path(arguments.scene) / "hdrusd" / f"street_{arguments.lights}.usda"
     job = Job(stage=stage, width=size[0], height=size[1], shadows=False, lights=arguments.mode)
     context = create_context()
     renderer = Renderer(context, job, Report())
@@ -50,10 +52,15 @@ def main() -> None:
         renderer.hdr.render(renderer.reader.read(1.0, camera))
         return renderer.hdr.read()
 
-    def write(number: int, image: np.ndarray, folder: str) -> None:
-        write_exr(Path(folder) / f"hdrusd.{number:04d}.exr", image, half=True)
+    writer = Writer().__enter__()
 
-    loop = common.Loop(arguments).run(render, write, "half EXR, ZIP")
+    def write(number: int, image: np.ndarray, folder: str) -> None:
+        path = Path(folder) / f"hdrusd.{number:04d}.exr"
+        writer.submit(write_exr, path, image, half=True, compression="htj2k")
+
+    write.finish = lambda: writer.__exit__(None, None, None)  # type: ignore[attr-defined]
+
+    loop = common.Loop(arguments).run(render, write, "half EXR, HTJ2K")
     loop.result(
         peer=f"hdrusd-{arguments.mode}",
         version=version("hdrusd"),
