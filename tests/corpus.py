@@ -1,6 +1,7 @@
 """Every database and stage below a folder, from reading to a picture, hostile ones included.
 
     python -m tests.corpus [DIR] [--out DIR] [--markdown FILE] [--only PATTERN]
+                           [--gallery DIR [--public]]
 
 A legacy file is converted, checked and rendered; a USD file is described and rendered. Each
 command runs in a process of its own under limits. A file passes when it ends in a picture
@@ -9,7 +10,8 @@ documented exit code; either way nothing may be written outside the output folde
 half-written may stay.
 
 A file in ``set/model/...`` below DIR may name files anywhere in ``set/model`` (``--root``),
-because some models keep their textures beside the folder of their meshes.
+because some models keep their textures beside the folder of their meshes. ``--gallery``
+writes contact sheets of the pictures, and what each file lost by the codes of docs/findings.md.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -32,6 +35,8 @@ from typing import Any
 import numpy as np
 
 from hdrusd.images import read_exr
+
+from .gallery import PRIVATE, write_sheets
 
 LEGACY = (".gltf", ".glb", ".obj", ".osg", ".osgt")
 STAGES = (".usda", ".usdc", ".usd", ".usdz")
@@ -69,6 +74,7 @@ class Row:
     seconds: float = 0.0
     counts: dict[str, int] = field(default_factory=dict)
     findings: int | None = None  # of conversion and rendering together
+    codes: Counter[str] = field(default_factory=Counter)  # of those that are listed
     lit: float = 0.0  # share of the pixels above 0 cd/m2
     dark: bool = False  # no material of it reflects or emits
     problem: str = ""
@@ -120,8 +126,7 @@ def run_corpus(
 
 def _try(folder: Path, file: Path, output: Path) -> Row:
     row = Row(file.relative_to(folder).as_posix())
-    home = output / row.name.replace("/", "__")
-    case = Case(folder, file, home)
+    case = Case(folder, file, _home(output, row))
     before = listing(folder)
     start = time.perf_counter()
     try:
@@ -135,6 +140,10 @@ def _try(folder: Path, file: Path, output: Path) -> Row:
     if not row.problem and listing(folder) != before:
         row.problem = "the source folder was written to"
     return row
+
+
+def _home(output: Path, row: Row) -> Path:
+    return output / row.name.replace("/", "__")
 
 
 @dataclass(slots=True)
@@ -173,6 +182,7 @@ class Case:
                 "lights": len(converted["lights"]),
             }
             row.findings = len(converted["findings"])
+            row.codes.update(finding["code"] for finding in converted["findings"])
             row.dark = _reflects_nothing(converted["materials"])
             self._hdrusd(["check", str(stage)])
         exr, png = self.out / "frame.exr", self.out / "frame.png"
@@ -181,6 +191,7 @@ class Case:
             ["render", str(stage), str(exr), "--png", str(png), *size, "--json", "--quiet"]
         )
         row.findings += len(rendered["findings"])
+        row.codes.update(finding["code"] for finding in rendered["findings"])
         rgb, _ = read_exr(exr)
         if rgb.shape != (HEIGHT, WIDTH, 3) or not np.isfinite(rgb).all():
             raise WrongError("the frame has a wrong size or numbers that are not finite")
@@ -276,6 +287,25 @@ def markdown(rows: Sequence[Row]) -> str:
     return "\n".join([*lines, "", totals(rows), ""])
 
 
+def write_gallery(rows: Iterable[Row], output: Path, gallery: Path, *, public: bool) -> None:
+    """Contact sheets of the pictures below ``output`` and ``gallery.md`` into ``gallery``.
+
+    ``public``: without what may not be shown by its licence, and what is broken on purpose.
+    """
+    hidden = PRIVATE if public else ()
+    pictures, lines = [], ["| file | findings |", "| --- | --- |"]
+    for row in rows:
+        picture = _home(output, row) / "out" / "frame.png"
+        if row.code or row.problem or any(fnmatch(row.name, pattern) for pattern in hidden):
+            continue
+        pictures.append((row.name, picture))
+        codes = ", ".join(f"{code} {count}" for code, count in sorted(row.codes.items()))
+        lines.append(f"| {row.name} | {codes or 'none'} |")
+    sheets = write_sheets(pictures, gallery)
+    shown = "".join(f"![Pictures of the corpus]({sheet.name})\n\n" for sheet in sheets)
+    (gallery / "gallery.md").write_text(shown + "\n".join([*lines, ""]), encoding="utf-8")
+
+
 def totals(rows: Sequence[Row]) -> str:
     """One line: how many pictures, refusals and failures."""
     wrong = sum(bool(row.problem) for row in rows)
@@ -292,6 +322,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, help="Keep the stages and pictures in this folder.")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="Write the table.")
     parser.add_argument("--only", default="*", metavar="PATTERN", help="Paths that match.")
+    parser.add_argument("--gallery", type=Path, metavar="DIR", help="Write contact sheets.")
+    parser.add_argument("--public", action="store_true", help="In them only what may be shown.")
     options = parser.parse_args(arguments)
     folder = options.folder
     if folder is None:
@@ -305,6 +337,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for row in run_corpus(folder, corpus_files(folder, options.only), output):
             rows.append(row)
             print("  ".join(row.cells()), flush=True)
+        if options.gallery is not None:
+            write_gallery(rows, output, options.gallery, public=options.public)
     print(totals(rows))
     if options.markdown is not None:
         options.markdown.write_text(markdown(rows), encoding="utf-8")

@@ -1,8 +1,4 @@
-"""Contact sheets of the pictures of a corpus run, and a table of what its files lost.
-
-A tile is a picture with the path of its file below; what was refused has no tile. Files of
-the same folder ``set/`` stand together, and each ends a sheet at ``ROWS`` rows.
-"""
+"""Contact sheets of pictures: tiles with a name below each."""
 
 from __future__ import annotations
 
@@ -16,6 +12,19 @@ import OpenImageIO as oiio
 
 T = TypeVar("T")
 Pixels = npt.NDArray[np.uint8]
+
+#: Files of the corpus whose pictures are not shown in public: share-alike and copyleft licences,
+#: data without a licence of its own, and what is broken on purpose.
+PRIVATE = (
+    "castle-demo/*",  # GPL-2.0
+    "delta3d/*",  # LGPL-2.1
+    "osgearth/*",  # LGPL-3.0
+    "openmaterial/*",  # CC-BY-SA-4.0
+    "usd-wg/full_assets/McUsd/*",  # textures CC-BY-SA-4.0
+    "hostile/*",
+    "assimp/invalid/*",
+    "assimp/glTF2/*",
+)
 
 #: Pixels of a tile's picture and of the line below it, and tiles of a sheet.
 WIDTH, HEIGHT, LABEL = 240, 135, 14

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import OpenImageIO as oiio
 import pytest
 
-from tests import corpus
+from tests import corpus, gallery
 from tests.corpus import Row, corpus_files, markdown, run_corpus, totals
 
 #: Small real files: each format, texture folders beside the meshes, lights, cameras, packages.
@@ -109,6 +110,24 @@ def test_pictures_and_refusals_pass(source: Path, output: Path) -> None:
     table = markdown(list(rows.values()))
     assert str(source) not in table
     assert len(table.splitlines()) == 2 + 5 + 2
+
+
+@pytest.mark.usefixtures("gl")
+def test_gallery_has_a_tile_of_each_picture(source: Path, output: Path, tmp_path: Path) -> None:
+    (source / "a.usda").write_text(STAGE.format(kind="Sphere"))
+    (source / "b.usda").write_text(STAGE.format(kind="Scope"))
+    (source / "hostile").mkdir()
+    (source / "hostile" / "c.usda").write_text(STAGE.format(kind="Cube"))
+    rows = list(run(source, corpus_files(source), output).values())
+    for public, names in ((False, ["a.usda", "hostile/c.usda"]), (True, ["a.usda"])):
+        folder = tmp_path / f"gallery-{public}"
+        corpus.write_gallery(rows, output, folder, public=public)
+        text = (folder / "gallery.md").read_text(encoding="utf-8")
+        assert [name for name in ("a.usda", "b.usda", "hostile/c.usda") if name in text] == names
+        assert "| a.usda | default-sky 1 |" in text
+        sheet = oiio.ImageBuf(str(folder / "gallery-1.jpg")).spec()
+        assert sheet.height == gallery.HEIGHT + gallery.LABEL
+        assert sheet.width == gallery.COLUMNS * gallery.WIDTH
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ LAYERS = (
     {"photometry", "tonemap"},
     {"importers", "images"},
     {"usd", "gpu"},
-    {"display", "maps", "validation"},
+    {"display", "luminaires", "maps", "validation"},
     {"surfaces"},
     {"convert", "render"},
     {"testing"},

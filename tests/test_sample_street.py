@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 import subprocess
 import sys
@@ -18,6 +17,16 @@ from typing import Any
 import numpy as np
 import OpenImageIO
 import pytest
+from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade
+
+from hdrusd.convert import Options, convert
+from hdrusd.errors import SourceRef
+from hdrusd.photometry.ies import read_ies
+from hdrusd.photometry.luminaire import Luminaire
+from hdrusd.report import Report
+from hdrusd.usd.light import read_light
+from hdrusd.usd.lux import photometric_file
+from hdrusd.usd.preview import MaterialReader
 
 SCRIPT = Path(__file__).parents[1] / "samples" / "street" / "make_street.py"
 
@@ -306,7 +315,7 @@ def test_every_light_and_every_glowing_material_has_an_entry(
     for node in osgt.drawn():
         if node.head[0] == "osg::LightSource":
             entry = _entry(photometry, "light", node.name)
-            assert "candela" in entry or "illuminance" in entry
+            assert entry.keys() & {"candela", "illuminance", "ies"}
             assert entry["source"]
     glowing = [m["name"] for m in gltf.document["materials"] if "emissiveFactor" in m]
     assert glowing
@@ -316,25 +325,30 @@ def test_every_light_and_every_glowing_material_has_an_entry(
         assert entry["source"]
 
 
-@pytest.mark.parametrize(
-    ("light", "glass", "direction"),
-    [
-        ("Luminaire_01_Lamp", "LampGlass", (0.0, 0.0, -1.0)),
-        ("ArcadeLantern_01_Lamp", "LanternGlass", (0.0, -1.0, 0.0)),
-    ],
-)
-def test_a_glass_is_as_bright_as_its_lamp(
-    photometry: dict[str, Any],
-    gltf: Gltf,
-    light: str,
-    glass: str,
-    direction: tuple[float, float, float],
-) -> None:
+def _luminaire(street: Path, entry: dict[str, Any]) -> tuple[Luminaire, float]:
+    """The photometric file of an entry, and the factor on its candela."""
+    file = street / entry["ies"]
+    lamp = read_ies(file.read_bytes(), SourceRef(file), Report())
+    return lamp, entry["lumens"] / lamp.flux()
+
+
+def test_a_lantern_is_as_bright_as_its_lamp(photometry: dict[str, Any], gltf: Gltf) -> None:
     """I = L A: a uniform glass sends its luminance times the area seen."""
-    candela = _entry(photometry, "light", light)["candela"]
-    luminance = _entry(photometry, "material", glass)["luminance"]
+    candela = _entry(photometry, "light", "ArcadeLantern_01_Lamp")["candela"]
+    luminance = _entry(photometry, "material", "LanternGlass")["luminance"]
     # 1 %: areas and luminances are written to three digits.
-    assert luminance * gltf.area_seen(glass, direction) == pytest.approx(candela, rel=0.01)
+    assert luminance * gltf.area_seen("LanternGlass", (0.0, -1.0, 0.0)) == pytest.approx(
+        candela, rel=0.01
+    )
+
+
+def test_a_luminaire_is_as_bright_as_its_file_from_below(
+    street: Path, photometry: dict[str, Any], gltf: Gltf
+) -> None:
+    lamp, factor = _luminaire(street, _entry(photometry, "light", "Luminaire_01_Lamp"))
+    luminance = _entry(photometry, "material", "LampGlass")["luminance"]
+    area = gltf.area_seen("LampGlass", (0.0, 0.0, -1.0))
+    assert luminance * area == pytest.approx(factor * lamp.value(0.0, 0.0), rel=0.01)
 
 
 @pytest.mark.parametrize(
@@ -360,15 +374,13 @@ def test_signal_lamps_keep_to_their_regulations(
 
 
 def test_road_gets_the_25_lux_of_the_city_it_is_like(
-    photometry: dict[str, Any], osgt: Osgt, gltf: Gltf
+    street: Path, photometry: dict[str, Any], osgt: Osgt
 ) -> None:
-    """Mean over one field between luminaires: E = I cos^n(a) h / d^3 from each of them."""
-    candela = _entry(photometry, "light", "Luminaire_01_Lamp")["candela"]
-    lamp = next(n for n in osgt.drawn() if n.name == "Luminaire_01_Lamp")
-    light = lamp.find("Light")
+    """Mean over one field between luminaires: E = I(C, gamma) h / d^3 from each of them."""
+    entry = _entry(photometry, "light", "Luminaire_01_Lamp")
+    lamp, factor = _luminaire(street, entry)
+    light = next(n for n in osgt.drawn() if n.name == "Luminaire_01_Lamp").find("Light")
     assert light is not None
-    exponent = float(light.blocks[0].value("SpotExponent") or 0.0)
-    cutoff = math.cos(math.radians(float(light.blocks[0].value("SpotCutoff") or 180.0)))
     reach, _, height, _ = light.blocks[0].numbers("Position")
     x, y = np.meshgrid(np.arange(-5.25, 5.5, 0.5), np.arange(65.25, 85.0, 0.5))
     lux = np.zeros_like(x)
@@ -378,9 +390,45 @@ def test_road_gets_the_25_lux_of_the_city_it_is_like(
             assert matrix is not None
             m = np.array([row.split() for row in matrix.lines], dtype=float)
             place = np.array((reach, 0.0, height, 1.0)) @ m
-            distance = np.sqrt((x - place[0]) ** 2 + (y - place[1]) ** 2 + place[2] ** 2)
-            cosine = place[2] / distance
-            inside = cosine > cutoff
-            lux += np.where(inside, candela * cosine ** (exponent + 1) / distance**2, 0.0)
+            c0 = np.array((*entry["c0"], 0.0)) @ m
+            c90 = np.cross((0.0, 0.0, 1.0), c0[:3])
+            way = np.stack((x - place[0], y - place[1], np.full_like(x, -place[2])), axis=2)
+            distance = np.linalg.norm(way, axis=2)
+            c = np.degrees(np.arctan2(way @ c90, way @ c0[:3]))
+            gamma = np.degrees(np.arccos(place[2] / distance))
+            lux += factor * lamp.value(c, gamma) * place[2] / distance**3
     assert lux.mean() == pytest.approx(25.0, rel=0.1)  # a class of EN 13201 is 25 to 50 % apart
     assert lux.min() / lux.mean() > 0.4  # EN 13201-2: overall uniformity of classes C
+    # Before the lamp, not behind it: C = 90 is to the road.
+    assert lamp.value(90.0, 45.0) > 2.0 * lamp.value(270.0, 45.0)
+
+
+def test_the_twins_become_the_same_light_and_the_same_gloss(street: Path, tmp_path: Path) -> None:
+    """Luminaires and wet surfaces are the photometry file's, whatever the format."""
+    made = {}
+    for file in ("street.osgt", "street.gltf"):
+        stage = Usd.Stage.Open(
+            str(convert(street / file, tmp_path / file[7:] / "a.usda", Options()).output)
+        )
+        rows, gloss = {}, {}
+        for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
+            name = prim.GetName()
+            if prim.IsA(UsdLux.SphereLight) and photometric_file(prim):
+                name = prim.GetParent().GetName()
+                world = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0)
+                if UsdGeom.GetStageUpAxis(stage) == "Y":
+                    world *= Gf.Matrix4d().SetRotate(Gf.Rotation(Gf.Vec3d(1, 0, 0), 90.0))
+                lamp = read_light(prim)
+                rows[name] = (*np.ravel(world), lamp.intensity, lamp.radius, *lamp.chromaticity)
+                gloss[name] = Path(lamp.profile).name
+            elif prim.IsA(UsdShade.Material) and name in ("Asphalt", "Puddle", "Pavement"):
+                wet = MaterialReader(stage, Report()).read(UsdShade.Material(prim), 0)
+                assert wet is not None
+                gloss[name] = wet.model
+                rows[name] = (*wet.specular, wet.roughness)
+        made[file] = rows, gloss
+    (rows, gloss), (others, same) = made.values()
+    assert gloss == same
+    assert sum(name.startswith("Luminaire") for name in rows) == 16
+    for name, values in rows.items():
+        assert values == pytest.approx(others[name], rel=1e-5, abs=1e-5), name

@@ -154,7 +154,7 @@ class SkyPass:
         ``layers``: the G-buffer by the names of its samplers. ``scale``: 1/pi, or 1 for
         ``petit2010``. ``arriving``: what SkyOcclusion found to be left of the sky.
         """
-        if not any(map(_mirrors, scene.materials)):
+        if not (any(scene.ambient) or scene.skies) or not any(map(_mirrors, scene.materials)):
             return
         textures = {**layers, "reflected_table": self._reflected()}
         uniforms: dict[str, Any] = {"scale": scale * math.pi}

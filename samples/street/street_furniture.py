@@ -86,8 +86,7 @@ def _tube(shape: Shape, spine: np.ndarray, radius: float) -> None:
 def lantern() -> Node:
     """A hexagonal lantern on a rod from the arcade's ceiling; its origin is the lamp."""
     kit = Kit(MATERIALS)
-    kit["LanternGlass"].revolve(((0.10, -0.24), (0.19, 0.16)), 6)
-    kit["Iron"].revolve(((0.0, -0.30), (0.11, -0.26), (0.11, -0.24)), 6)
+    kit["LanternGlass"].revolve(((0.0, -0.24), (0.10, -0.24), (0.19, 0.16)), 6)
     kit["Iron"].revolve(((0.20, 0.16), (0.22, 0.18), (0.10, 0.34), (0.03, 0.38), (0.015, 1.21)), 6)
     return Node("LanternModel", meshes=kit.meshes("LanternModel"))
 

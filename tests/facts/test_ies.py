@@ -7,7 +7,7 @@ import pytest
 from photometric_files import GAMMA, IES, QUADRANT, ies, ies_text
 
 from hdrusd.errors import InputError
-from hdrusd.photometry.ies import is_ies, read_ies
+from hdrusd.photometry.ies import is_ies, read_ies, with_tilt
 from hdrusd.photometry.luminaire import Opening
 from hdrusd.report import Report
 
@@ -150,6 +150,16 @@ def test_what_is_broken_is_one_line(text: str, problem: str) -> None:
     assert problem in str(error.value)
     assert str(error.value).startswith("lamp.ies: ")
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_a_file_that_stands_alone_reads_as_with_its_tilt_file(end: str) -> None:
+    data = ies_text(tilt="TILT=lamp.tlt").replace("\n", end).encode()
+    beside = {"lamp.tlt": TILTED.replace("\n", end).encode()}
+    alone = read_ies(with_tilt(data, beside.get), IES, Report())
+    assert alone.candela.tolist() == read_ies(data, IES, Report(), beside.get).candela.tolist()
+    for same in (data, ies_text().encode(), with_tilt(data, beside.get), b"EULUMDAT"):
+        assert with_tilt(same, {}.get) == same
 
 
 def test_the_kind_of_a_file_by_its_tilt_line() -> None:

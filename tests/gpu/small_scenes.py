@@ -154,17 +154,23 @@ def render(
     gl: moderngl.Context,
     scene: RenderScene,
     load: Callable[[TextureRef], ImageData | None] = lambda _: None,
+    size: tuple[int, int] = (WIDTH, HEIGHT),
     **options: Any,
 ) -> Rendered:
-    """One frame of 64 x 48 pixels by shader 1."""
+    """One frame by shader 1, each lamp counted alone."""
     # Without shadows, unless asked for: the pixels are what the formulas say of them alone.
     renderer = HdrRenderer(
         gl,
         Programs(gl),
-        (WIDTH, HEIGHT),
+        size,
         load,
         Options(**{"shadows": False, "lights": "exact", **options}),
     )
+    return rendered(renderer, scene)
+
+
+def rendered(renderer: HdrRenderer, scene: RenderScene) -> Rendered:
+    """The next frame of a renderer."""
     renderer.render(scene)
     normal, diffuse, specular, hdr = (
         renderer.layer(name).astype(np.float64)
@@ -174,8 +180,8 @@ def render(
         extra = renderer.layer("g_extra").astype(np.float64)
     except KeyError:  # nothing in the scene needs it
         extra = np.broadcast_to([0.0, 1.0, 0.0, 0.0], hdr.shape)
-    gl.extra["framebuffer"].use()
-    origins, directions = rays(scene.camera)
+    renderer.ctx.extra["framebuffer"].use()
+    origins, directions = rays(scene.camera, renderer.size)
     return Rendered(
         frame=renderer.read().astype(np.float64),
         surface=hdr[..., 3] == 1.0,

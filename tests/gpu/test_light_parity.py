@@ -102,6 +102,14 @@ def test_each_kind_of_light_on_each_material(gl: Any, kind: str, material: str) 
         assert set(np.unique(np.sign(got.shininess[got.surface]))) == {-1.0, 1.0}
 
 
+@pytest.mark.parametrize("other", ["ggx", "coated"])
+def test_a_matte_surface_of_the_other_model_in_one_tile(gl: Any, other: str) -> None:
+    """Without a highlight its gloss is 0: as a width of GGX, away from the light, 0 / 0."""
+    away = quad((-1.2, -1.0, 0.3), (1.6, 0.0, 0.0), (0.0, 0.3, 1.0), key="away")
+    shown = scene((MATERIALS[other][0], MATERIALS["matte"][0]), HIGH, KINDS["sphere"])
+    assert_is_its_shading(gl, replace(shown, draws=(shown.draws[0], draw(away, 1))))
+
+
 @pytest.mark.parametrize("material", ["blinn", "coated"])
 def test_the_raw_highlights_of_petit2010(gl: Any, material: str) -> None:
     shown = scene(MATERIALS[material], KINDS["rect"], KINDS["sun"], KINDS["cylinder"])
@@ -257,6 +265,4 @@ def test_ten_kilometres_from_the_origin(gl: Any) -> None:
     assert np.array_equal(far.surface, near.surface)
     wanted = shading(near, shown)
     # Depths differ in their last digit, by 1e-7 of 4 m: 1e-5 of the distance to the nearest lamp.
-    np.testing.assert_allclose(
-        far.frame[far.surface], wanted, rtol=2e-4, atol=1e-5 * wanted.max()
-    )
+    np.testing.assert_allclose(far.frame[far.surface], wanted, rtol=2e-4, atol=1e-5 * wanted.max())

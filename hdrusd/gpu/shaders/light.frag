@@ -165,7 +165,7 @@ void main()
 #endif
 #endif
 #ifdef GGX
-    alpha2 = s.gloss * s.gloss;
+    alpha2 = max(s.gloss * s.gloss, 1e-6);  // code 0, of matte surfaces between: no 0 / 0
     gain = ggx_gain(s.nv, alpha2, lambert_scale);
 #ifdef COATED
     coat = extra.x;
