@@ -6,7 +6,7 @@ import contextlib
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +81,7 @@ class Frame:
     camera: Camera
     files: tuple[Path, ...] = ()
     skipped: bool = False
+    light_error: float = 0.0  # bound of merging lamps (HdrRenderer.light_error); 0: each alone
 
 
 def open_stage(
@@ -233,7 +234,8 @@ class Renderer:
         if self.display is not None:
             parameters = self._parameters(self.display.operator, camera)
             ldr, statistics = self.display.show(texture, parameters)
-        return Frame(time, self.hdr.read(), ldr, statistics, camera)
+        error = self.hdr.light_error
+        return Frame(time, self.hdr.read(), ldr, statistics, camera, light_error=error)
 
     def _check_camera(self, camera: Camera) -> None:
         """A camera that sees nothing would give black frames, silently."""
@@ -324,12 +326,16 @@ def render_sequence(ctx: moderngl.Context, job: Job, report: Report) -> Iterator
                 )
             if job.png is not None and frame.ldr is not None:
                 writer.submit(write_png, frame_path(job.png, time), frame.ldr)
-            yield Frame(frame.time, frame.hdr, frame.ldr, frame.statistics, frame.camera, files)
+            yield replace(frame, files=files)
 
 
 def exr_header(renderer: Renderer, frame: Frame) -> dict[str, Any]:
-    """What a frame says about itself: time, camera matrices (row vectors, metres), reflection."""
-    camera, stage = frame.camera, renderer.stage
+    """What a frame says about itself.
+
+    Time, camera matrices (row vectors, metres), reflection; how lights were added: "exact" or
+    "merged" with the bound of its error, shadows, samples a pixel and of the sky.
+    """
+    camera, stage, job = frame.camera, renderer.stage, renderer.job
     view = camera.world_to_view()
     ndc = view @ camera.projection()
     header: dict[str, Any] = {
@@ -337,8 +343,13 @@ def exr_header(renderer: Renderer, frame: Frame) -> dict[str, Any]:
         "worldToNDC": ndc.astype(np.float32),
         "hdrusd:timeCodesPerSecond": float(stage.GetTimeCodesPerSecond()),
         "hdrusd:camera": camera.name,
-        "hdrusd:reflection": renderer.job.reflection,
-        "hdrusd:stage": renderer.job.stage.name,
+        "hdrusd:reflection": job.reflection,
+        "hdrusd:stage": job.stage.name,
+        "hdrusd:lights": "merged" if frame.light_error else "exact",
+        "hdrusd:lightErrorBound": frame.light_error,
+        "hdrusd:shadows": "maps" if job.shadows else "none",
+        "hdrusd:samples": job.samples,
+        "hdrusd:skySamples": job.sky_samples,
     }
     if math.isfinite(frame.time):  # the default time is no number
         header["hdrusd:frame"] = float(frame.time)

@@ -11,14 +11,14 @@ from tests.bench import memory
 
 @pytest.mark.usefixtures("gl")
 def test_nothing_is_forgotten_and_nothing_piles_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    """From frame 24 to 36 lamps are switched, and all else moves."""
-    monkeypatch.setattr(memory, "EVERY", 12)
-    monkeypatch.setattr(memory, "LAMPS", 6)
+    """From frame 40 to 60 lamps are switched, and all else moves."""
+    monkeypatch.setattr(memory, "EVERY", 20)
+    monkeypatch.setattr(memory, "LAMPS", 3)
     counts, lost = {}, {}
-    for frame, _, held, forgotten in memory.watch(36, (32, 18)):
+    for frame, _, held, forgotten in memory.watch(60, (32, 18)):
         counts[frame], lost[frame] = held, forgotten
     assert set(lost.values()) == {0}
-    assert counts[36] == counts[24]
+    assert counts[60] == counts[40]
 
 
 def test_the_stage_has_all_that_moves(tmp_path: Path) -> None:

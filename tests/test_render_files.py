@@ -14,6 +14,7 @@ from stage_text import GROUND, SKY, write_stage
 
 from hdrusd.display import Writer
 from hdrusd.images import read_exr, read_image, write_png
+from hdrusd.photometry.lightcut import EPSILON
 from hdrusd.render import Frame, Job, Renderer, render_sequence
 from hdrusd.report import Kind, Report
 from hdrusd.tonemap.operator import OPERATORS
@@ -56,6 +57,60 @@ def test_camera_matrices_in_the_header(gl: Any, tmp_path: Path) -> None:
     np.testing.assert_allclose(point @ header["worldToCamera"], [1.0, 0.75, -4.0, 1.0], atol=1e-6)
     clip = point @ header["worldToNDC"]
     np.testing.assert_allclose(clip[:2] / clip[3], [0.5, 0.5], atol=1e-6)
+
+
+def lamps(count: int, more: str = "") -> str:
+    """Points of 5 cm over the ground, a metre apart in a row."""
+    return "".join(
+        f"""\
+def SphereLight "Lamp{k}" (
+    prepend apiSchemas = ["ShadowAPI"]
+)
+{{
+    float inputs:radius = 0.05
+    {more}
+    double3 xformOp:translate = ({k - count / 2}, 2, 3)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}}
+"""
+        for k in range(count)
+    )
+
+
+@pytest.mark.parametrize(
+    ("count", "mode", "merged"),
+    [(70, "auto", True), (70, "exact", False), (8, "auto", False), (8, "merged", True)],
+)
+def test_the_header_says_how_lights_were_added(
+    gl: Any, tmp_path: Path, count: int, mode: Any, merged: bool
+) -> None:
+    stage = write_stage(tmp_path / "a.usda", GROUND, lamps(count))
+    report = Report()
+    exr = str(tmp_path / "a.####.exr")
+    render(gl, stage, report, times=[1.0, 2.0], exr=exr, lights=mode, shadows=False)
+    header = read_exr(tmp_path / "a.0002.exr")[1]
+    assert header["hdrusd:lights"] == ("merged" if merged else "exact")
+    assert header["hdrusd:lightErrorBound"] == pytest.approx(EPSILON if merged else 0.0, rel=1e-6)
+    assert header["hdrusd:shadows"] == "none"
+    assert (header["hdrusd:samples"], header["hdrusd:skySamples"]) == (1, 0)
+    found = [f for f in report if f.code == "lights-merged"]
+    assert [(f.kind, f.source.file) for f in found] == merged * [(Kind.ASSUMED, stage)]
+    assert all(f.text.startswith(f"{count} lamps: ") and "2 %" in f.text for f in found)
+
+
+@pytest.mark.parametrize("shadow", [True, False])
+def test_lamps_with_shadow_maps_are_counted_alone(gl: Any, tmp_path: Path, shadow: bool) -> None:
+    """What is merged is said by what was done, not by what was allowed."""
+    more = f"bool inputs:shadow:enable = {int(shadow)}"
+    stage = write_stage(tmp_path / "a.usda", GROUND, lamps(8, more))
+    exr = str(tmp_path / "a.exr")
+    report = Report()
+    render(gl, stage, report, exr=exr, lights="merged", samples=4, sky_samples=4)
+    header = read_exr(Path(exr))[1]
+    assert header["hdrusd:lights"] == ("exact" if shadow else "merged")
+    assert ("lights-merged" in report.codes()) != shadow
+    assert header["hdrusd:shadows"] == "maps"
+    assert (header["hdrusd:samples"], header["hdrusd:skySamples"]) == (4, 4)
 
 
 def test_half_that_clips_is_a_finding(gl: Any, tmp_path: Path) -> None:

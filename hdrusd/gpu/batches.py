@@ -15,9 +15,6 @@ import numpy.typing as npt
 
 Ints = npt.NDArray[np.int32]
 
-#: vec4 that OpenGL 3.3 grants between stages, less the one of the window position.
-VARYINGS = 31
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lists:
@@ -48,11 +45,17 @@ class Draws:
 
 
 def batches(
-    lists: Lists, sizes: tuple[int, ...], rows: int, coned: Lists, coned_sizes: tuple[int, ...]
+    lists: Lists,
+    sizes: tuple[int, ...],
+    rows: int,
+    coned: Lists,
+    coned_sizes: tuple[int, ...],
+    varyings: int,
 ) -> list[Draws]:
     """Cut the lists of the rectangles into batches; ``rows``: texels of a light of the first kind.
 
-    ``sizes``, ascending: how many lights a batch may hold. Either kind may be empty.
+    ``sizes``, ascending: how many lights a batch may hold; both kinds together no more than
+    ``varyings`` texels. Either kind may be empty.
     """
     rectangles = np.arange(len(lists.count), dtype=np.int32)
     draws = []
@@ -70,7 +73,7 @@ def batches(
         size = np.concatenate([[0], own])[np.searchsorted(own, rest, "left") + (rest > 0)]
         rests.append((kind.first + full * own[-1], rest, size))
     (first, count, size), (cone_first, cone_count, cone_size) = rests
-    together = size * rows + cone_size * 3 <= VARYINGS
+    together = size * rows + cone_size * 3 <= varyings
     table = np.stack([first, count, cone_first, cone_count], axis=1).astype(np.int32)
     for chosen, one, two in (
         (together, size, cone_size),

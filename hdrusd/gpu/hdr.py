@@ -40,6 +40,7 @@ from hdrusd.gpu.sky_occlusion import SkyOcclusion
 from hdrusd.gpu.supersampling import Accumulator, offsets, shifted
 from hdrusd.gpu.surfaces import SurfacePass, set_used
 from hdrusd.gpu.textures import TextureCache
+from hdrusd.photometry.lightcut import EPSILON
 from hdrusd.photometry.sky import SH_TERMS
 from hdrusd.report import Kind, Report
 from hdrusd.scene import ImageData, RenderScene, TextureRef
@@ -118,6 +119,7 @@ class HdrRenderer:
         self._frame = ctx.framebuffer([self._layers["hdr"]], self._depth)
         self._distances = ctx.framebuffer([self._layers["g_normal"]], self._depth)
         self._peeling: Peeling | None = None
+        self._told_merged = False
         self._samples = tuple(offsets(options.samples))
         self._sum = Accumulator(ctx, programs, size) if options.samples > 1 else None
 
@@ -132,13 +134,24 @@ class HdrRenderer:
         extras = self._extras(scene)
         if self._sum is None:
             self._draw(scene, extras)
+            self._tell_merged()
             return self.hdr
         self._sum.clear()
         for offset in self._samples:
             camera = shifted(scene.camera, offset, self.size)
             self._draw(replace(scene, camera=camera), extras)
             self._sum.add(self._layers["hdr"], 1.0 / len(self._samples))
+        self._tell_merged()
         return self.hdr
+
+    @property
+    def light_error(self) -> float:
+        """Bound of what merging lamps has changed in the last frame (photometry/lightcut.py).
+
+        A share of the illuminance by all lamps on a small ball, unhidden; 0 where each lamp
+        was counted alone.
+        """
+        return EPSILON if self.lights.merged else 0.0
 
     def read(self) -> npt.NDArray[np.float32]:
         """The frame as (h, w, 3) float32 in cd/m2, top row first."""
@@ -211,6 +224,17 @@ class HdrRenderer:
         if peeling.truncated:
             text = f"what lies behind {MAX_LAYERS} blended surfaces is not shown"
             self.report.add(Kind.DROPPED, "blend-layers", self.place, "", text)
+
+    def _tell_merged(self) -> None:
+        """Once, at the first frame in which lamps were taken together."""
+        if self._told_merged or not self.lights.merged:
+            return
+        self._told_merged = True
+        text = (
+            f"{self.lights.merged} lamps: far ones are taken together, which changes the "
+            f"illuminance by {100 * EPSILON:g} % at most of what all lamps give a small ball there"
+        )
+        self.report.add(Kind.ASSUMED, "lights-merged", self.place, "", text)
 
     # -- what the steps need -------------------------------------------------------------
 

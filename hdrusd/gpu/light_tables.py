@@ -21,9 +21,6 @@ from hdrusd.scene import CYLINDER, DISK, NO_CONE, POINT, RECT, SPHERE, Camera
 Floats = npt.NDArray[np.float32]
 Lights = npt.NDArray[np.void]
 
-#: vec4 that OpenGL 3.3 grants between stages, less the one of the window position.
-_VARYINGS = 31
-
 #: Batches smaller than the full one, so that a rest of lights costs no more than it must.
 #: Few, for each is a program to compile.
 _SMALL_BATCHES = (1, 4)
@@ -72,10 +69,9 @@ class LightClass:
         """Texels a light."""
         return int(self.texels.shape[1])
 
-    @property
-    def batches(self) -> tuple[int, ...]:
-        """How many of them a batch may hold, ascending."""
-        full = _VARYINGS // self.rows
+    def batches(self, varyings: int) -> tuple[int, ...]:
+        """How many of them a batch may hold, ascending; ``varyings``: vec4 for their texels."""
+        full = varyings // self.rows
         return (*(size for size in _SMALL_BATCHES if 2 * size <= full), full)
 
 

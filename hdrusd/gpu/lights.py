@@ -80,6 +80,9 @@ class LightPass:
         self.size = size
         self.scale = scale
         self._lists = LightLists()
+        # One vec4 is the place in the window. OpenGL 3.3 grants 16, most devices 32.
+        names = ("GL_MAX_VERTEX_OUTPUT_COMPONENTS", "GL_MAX_FRAGMENT_INPUT_COMPONENTS")
+        self._varyings = min(int(ctx.info.get(name, 64)) for name in names) // 4 - 1
         self._grid = (-(-size[0] // TILE), -(-size[1] // TILE))
         self._bounds = ctx.texture(self._grid, 4, dtype="f4")
         self._bounds_frame = ctx.framebuffer([self._bounds])
@@ -128,15 +131,22 @@ class LightPass:
         table.texture.use(TABLE_UNIT)
         if dielectric is not None:
             uniforms["dielectric"] = dielectric
-        for region in regions:
-            names = list(_GLOSS[region.gloss])
-            if 2 & region.gloss:
-                names += ["COATED"] if "g_extra" in layers else []
-                names += ["DIELECTRIC"] if dielectric is not None else []
-            self._add_classes(table, region, names, uniforms, bind)
-        table.texture.release()
-        frame.depth_mask = True
-        ctx.enable_only(moderngl.NOTHING)
+        try:
+            for region in regions:
+                names = list(_GLOSS[region.gloss])
+                if 2 & region.gloss:
+                    names += ["COATED"] if "g_extra" in layers else []
+                    names += ["DIELECTRIC"] if dielectric is not None else []
+                self._add_classes(table, region, names, uniforms, bind)
+        finally:
+            table.texture.release()
+            frame.depth_mask = True
+            ctx.enable_only(moderngl.NOTHING)
+
+    @property
+    def merged(self) -> int:
+        """How many lamps of the last frame may have been seen as one with others."""
+        return self._lists.in_trees
 
     def merges(self, lights: npt.NDArray[np.void]) -> bool:
         """Whether far lamps of these are taken together."""
@@ -215,10 +225,11 @@ class LightPass:
             own = {**uniforms, "dark": (table.dark(first), table.dark(second))}
             for draws in batches(
                 lists,
-                kind.batches if kind is not None else (1,),
+                kind.batches(self._varyings) if kind is not None else (1,),
                 rows,
                 coned_lists.after(len(lists.order)),
-                coned.batches if coned is not None else (1,),
+                coned.batches(self._varyings) if coned is not None else (1,),
+                self._varyings,
             ):
                 program = self._program(kind, rows, draws.sizes, names)
                 for name, value in own.items():
@@ -362,7 +373,8 @@ def _texture(
     """Values in rows of one width: (n, 4) float32 texels, or (n,) int32 numbers."""
     channels = 4 if values.ndim == 2 else 1
     flat = values.reshape(-1, channels)
-    width = min(max(len(flat), 1), _WIDTH)
+    tallest = int(ctx.info["GL_MAX_TEXTURE_SIZE"])
+    width = min(max(len(flat), 1), max(_WIDTH, -(-len(flat) // tallest)))
     height = max(-(-len(flat) // width), 1)
     full = np.zeros((height * width, channels), flat.dtype)
     full[: len(flat)] = flat

@@ -139,7 +139,7 @@ class SkyPass:
                 "factor": sky.factor,
                 "level": _level(scene.camera, size[0], whole.width),
             }
-            self._draw(program, {"sky": whole}, uniforms, scene.camera, frame, "==")
+            self._draw(program, {"sky": whole}, uniforms, scene.camera, frame, "<=")
 
     def add_mirrored(
         self,

@@ -95,6 +95,11 @@ class LightLists:
         self._last: list[npt.NDArray[np.generic]] = []
         self._found: dict[int, TileList] = {}
 
+    @property
+    def in_trees(self) -> int:
+        """How many lights may be seen as one with others; 0 where each is counted alone."""
+        return len(self._in_tree) if self._tree.merged else 0
+
     def update(self, lights: Lights, merge: Bools) -> Lights:
         """Take the lights of a frame (dtype LIGHT); returns ``table``.
 
@@ -106,7 +111,8 @@ class LightLists:
         changed = np.ones(len(lights), np.bool_)
         if len(self._lights) == len(lights):
             changed = _bytes(lights) != _bytes(self._lights)
-        if 2 * np.count_nonzero(changed) > len(lights):  # another scene, not traffic
+        other = len(self._still) != len(lights)
+        if other or 2 * np.count_nonzero(changed) > len(lights):  # another scene, not traffic
             self._still = np.full(len(lights), STILL)
         else:
             self._still = np.where(changed, 0, np.minimum(self._still + 1, STILL))
@@ -174,10 +180,6 @@ def _bytes(lights: Lights) -> npt.NDArray[np.void]:
     """Rows as they lie in memory: NaN equals itself."""
     rows = np.ascontiguousarray(lights)
     return rows.view(np.dtype((np.void, rows.dtype.itemsize)))
-
-
-def _equal(a: npt.NDArray[np.generic], b: npt.NDArray[np.generic]) -> bool:
-    return np.array_equal(a, b)
 
 
 def _list(tile: Ints, row: Ints, everywhere: Ints, tiles: int) -> TileList:

@@ -185,13 +185,6 @@ def irradiance_coefficients(texels: Doubles) -> Doubles:
     return np.asarray(moments * (_PASSED * _NORMAL**2)[:, None])
 
 
-def constant_coefficients(lux: Array) -> Doubles:
-    """(18, 3) of light from everywhere alike, ``lux`` (3,)."""
-    coefficients = np.zeros((SH_TERMS, 3))
-    coefficients[0] = lux
-    return coefficients
-
-
 def turned_coefficients(coefficients: Doubles, rotation: Array) -> Doubles:
     """Coefficients (18, 3) in the dome's axes as ones in the world's.
 

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 import pytest
-from small_scenes import draw, lights, look, quad, render, waves
+from parity import assert_is_its_shading
+from small_scenes import draw, lights, look, quad, waves
 
-from hdrusd.photometry.shading import shade
 from hdrusd.scene import Material, RenderScene
-
-#: Positions and normals of 6e-8; a lobe of width alpha changes by four times that over alpha.
-RELATIVE = 1e-4
 
 LAMPS = lights(
     {"position": (1.0, 0.5, 2.0), "intensity": (900.0, 700.0, 400.0)},
@@ -40,21 +36,7 @@ def test_frame_is_the_shading_of_its_g_buffer(gl: Any, name: str, reflection: An
         materials=(MATERIALS[name],),
         camera=look((0.5, -2.5, 1.2), half=0.45),
     )
-    got = render(gl, scene, reflection=reflection, shadows=False)
-    seen = got.surface
-    assert seen.mean() > 0.3
-    wanted = shade(
-        got.position[seen],
-        got.normal[seen],
-        got.diffuse[seen],
-        got.specular[seen],
-        got.shininess[seen],
-        scene.lights,
-        eye=np.asarray(scene.camera.eye),
-        scale=1.0 if reflection == "petit2010" else 1.0 / math.pi,
-        metallic=got.metallic[seen],
-    )
-    np.testing.assert_allclose(got.frame[seen], wanted, rtol=RELATIVE, atol=1e-6 * wanted.max())
+    assert_is_its_shading(gl, scene, reflection=reflection)
 
 
 def test_legacy_and_modern_side_by_side(gl: Any) -> None:
@@ -67,17 +49,5 @@ def test_legacy_and_modern_side_by_side(gl: Any) -> None:
     scene = RenderScene(
         lights=LAMPS, draws=(left, right), materials=(glossy, MATERIALS["metal"]), camera=look()
     )
-    got = render(gl, scene, shadows=False)
+    got = assert_is_its_shading(gl, scene)
     assert set(np.unique(got.shininess[got.surface] < 0.0)) == {False, True}
-    seen = got.surface
-    wanted = shade(
-        got.position[seen],
-        got.normal[seen],
-        got.diffuse[seen],
-        got.specular[seen],
-        got.shininess[seen],
-        scene.lights,
-        eye=np.asarray(scene.camera.eye),
-        metallic=got.metallic[seen],
-    )
-    np.testing.assert_allclose(got.frame[seen], wanted, rtol=RELATIVE, atol=1e-6 * wanted.max())

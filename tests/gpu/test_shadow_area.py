@@ -7,42 +7,26 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shadow_scenes import along, draw, maps, plane, scene, seen, slab
-from small_scenes import look, quad
+from shadow_scenes import (
+    EDGE,
+    HEIGHT,
+    STEP,
+    along,
+    draw,
+    half_plane,
+    maps,
+    plane,
+    rect_light,
+    rectangle_factor,
+    scene,
+    seen,
+    segment,
+    slab,
+)
+from small_scenes import look
 
 from hdrusd.gpu.shadow_views import pattern
-from hdrusd.scene import CYLINDER, DISK, RECT, SPHERE
-
-HEIGHT, EDGE = 3.0, 1.2  # of the light and of what hides it
-
-#: Of 16 points each stands for 1/16; where an edge passes one, half a point is wrong either way.
-#: Their weights (cos cos / d^2) differ by less than 1 : 1.6 in the places below.
-STEP = 1.6 / 16
-
-
-def half_plane() -> Any:
-    """Hides what is above x < 0."""
-    return quad((-40.0, -40.0, EDGE), (40.0, 0.0, 0.0), (0.0, 80.0, 0.0), key="edge")
-
-
-def corner_factor(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Form factor of a parallel rectangle with a corner straight above: x, y sides by height.
-
-    Howell, catalogue of radiation configuration factors, B-3.
-    """
-    a, b = np.sqrt(1.0 + x * x), np.sqrt(1.0 + y * y)
-    return (x / a * np.arctan(y / a) + y / b * np.arctan(x / b)) / (2.0 * math.pi)
-
-
-def rectangle_factor(x0: Any, x1: Any, y0: Any, y1: Any) -> np.ndarray:
-    """Of a rectangle anywhere at height 1 above the surface."""
-    signs = [(x1, y1, 1), (x0, y1, -1), (x1, y0, -1), (x0, y0, 1)]
-    return np.sum([s * corner_factor(np.asarray(x), np.asarray(y)) for x, y, s in signs], axis=0)
-
-
-def rect_light(**fields: Any) -> dict[str, Any]:
-    light = {"position": (0.0, 0.0, HEIGHT), "intensity": 100.0, "shape": RECT}
-    return light | {"x": (0.8, 0.0, 0.0), "y": (0.0, 0.5, 0.0)} | fields
+from hdrusd.scene import CYLINDER, DISK, SPHERE
 
 
 @pytest.mark.parametrize("samples", [16, 64])
@@ -72,12 +56,6 @@ def test_a_disk_half_behind_an_edge(gl: Any, turn: float) -> None:
     light = rect_light(shape=DISK, x=(c, s, 0.0), y=(-s, c, 0.0))
     shown = scene(light, draw(plane(40.0)), draw(half_plane()))
     assert seen(gl, shown, [(0.0, 0.0, 0.0)])[0] == pytest.approx(0.5, abs=STEP / 2)
-
-
-def segment(h: np.ndarray) -> np.ndarray:
-    """Share of a disk of radius 1 on the far side of a line at h from its middle."""
-    h = np.clip(h, -1.0, 1.0)
-    return (np.arccos(h) - h * np.sqrt(1.0 - h * h)) / math.pi
 
 
 def test_a_sphere_behind_an_edge(gl: Any) -> None:

@@ -219,6 +219,16 @@ def test_traffic_is_not_merged_and_joins_when_it_stands() -> None:
     assert len(table) == 60 + 59
 
 
+def test_lights_that_go_out_and_come_back() -> None:
+    keeper = LightLists()
+    rng = np.random.default_rng(8)
+    for count in (5, 0, 3, 1, 0, 5):
+        lights = lamps(rng, count)
+        table = keeper.update(lights, np.ones(count, np.bool_))
+        assert len(table) == count + max(count - 1, 0)
+        assert keeper.in_trees == (count if count > 1 else 0)
+
+
 @pytest.mark.parametrize("count", [0, 1])
 def test_few_lights_and_no_tiles(count: int) -> None:
     keeper = LightLists()

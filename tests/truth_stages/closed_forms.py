@@ -291,6 +291,12 @@ def two_tone_dome(_: float) -> Array:
     return np.where(panel, 0.75 * 512.0 + 0.25 * 64.0, 512.0) * MATTE
 
 
+def panes(_: float) -> Array:
+    """One pane or three of opacity 0.25 over the ground: each fades what is behind it into 0.8."""
+    one, three = (0.8 + 0.75**count * (MATTE - 0.8) for count in (1, 3))
+    return np.where(plane()[..., :1] < 0.0, one, three) * SKY
+
+
 def light_link(_: float) -> Array:
     linked = point_lux(plane(), 1000.0, (0.5, 0.25, 2.0))
     free = point_lux(plane(), 500.0, (-0.5, 0.5, 1.5))
@@ -348,6 +354,7 @@ TRUTHS: Mapping[str, Truth] = {
     "two_tone_dome": Truth(
         two_tone_dome, ("dome light", "lat-long texture", "dome orientation"), ((8, 8), (38, 24))
     ),
+    "panes": Truth(panes, ("opacity", "transparency", "order"), ((8, 8), (40, 24))),
     "light_link": Truth(light_link, ("light linking", "point light")),
 }
 

@@ -145,11 +145,26 @@ def test_a_matrix_below_an_animation_is_taken_apart() -> None:
 # -- spaces of lights ---------------------------------------------------------------------
 
 
-@given(st.tuples(NUMBERS, NUMBERS, NUMBERS).filter(lambda v: np.linalg.norm(v) > 0.1))
+VECTORS = st.tuples(NUMBERS, NUMBERS, NUMBERS).filter(lambda v: np.linalg.norm(v) > 0.1)
+
+
+@given(VECTORS)
 def test_aim_turns_minus_z(direction: tuple[float, float, float]) -> None:
     turn = aim(direction)
     got = Gf.Vec3d(0, 0, -1) if turn is None else Gf.Rotation(turn).TransformDir(Gf.Vec3d(0, 0, -1))
     assert np.array(got) == pytest.approx(direction / np.linalg.norm(direction), abs=1e-9)
+
+
+@given(VECTORS, VECTORS)
+def test_aim_turns_x_to_the_right_as_nearly_as_it_can(direction: Any, right: Any) -> None:
+    turn = aim(direction, right)
+    move = Gf.Rotation(turn) if turn is not None else Gf.Rotation(Gf.Vec3d(0, 0, 1), 0.0)
+    axis = np.array(move.TransformDir(Gf.Vec3d(0, 0, -1)))
+    assert axis == pytest.approx(direction / np.linalg.norm(direction), abs=1e-9)
+    part = right - axis * (axis @ right)
+    if np.linalg.norm(part) > 1e-5 * np.linalg.norm(right):  # of nearly parallel ones, by rounding
+        got = np.array(move.TransformDir(Gf.Vec3d(1, 0, 0)))
+        assert got == pytest.approx(part / np.linalg.norm(part), abs=1e-9)
 
 
 def test_aim_of_nothing_is_none() -> None:

@@ -158,8 +158,10 @@ void main()
 #endif
 #ifdef PEEL
     float wall = textureLod(opaque, gl_FragCoord.xy * pixel, 0.0).w;
-    // What is painted on a wall lies in it, but for the rounding of both distances.
-    if (depth <= textureLod(before, gl_FragCoord.xy * pixel, 0.0).w
+    float front = textureLod(before, gl_FragCoord.xy * pixel, 0.0).w;
+    // 0: the layer before had nothing left here. What is painted on a wall lies in it, but
+    // for the rounding of both distances.
+    if (front == 0.0 || depth <= front
         || (wall != 0.0 && depth > wall * (1.0 + 4e-6)))
         discard;
 #endif

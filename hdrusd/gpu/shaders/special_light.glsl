@@ -36,8 +36,7 @@ Arrival special_arrival(Surface s, int at)
     strength *= profile_candela(profile_atlas, data[at + at_profile], data[at + at_profile + 1], away);
 #endif
 #ifdef LINKED
-    float bit = exp2(more.z - 1.0);
-    strength *= mod(floor(s.links / bit), 2.0);
+    strength *= float((int(s.links) >> (int(more.z) - 1)) & 1);
 #endif
 #ifdef SHADOWED
     vec4 rows[SHADOW_ROWS];
