@@ -142,7 +142,7 @@ COMPLEXITIES |= {"1.0": 0, "1.1": 1, "1.2": 2, "1.3": 3}
     type=click.Choice(["auto", "exact", "merged"]),
     default="auto",
     show_default=True,
-    help="exact: every light in every pixel. merged: far lamps as one, within 1 % of the "
+    help="exact: every light in every pixel. merged: far lamps as one, within 2 % of the "
     "illuminance. auto: merged above 64 lights.",
 )
 @click.option(

@@ -178,6 +178,7 @@ class Renderer:
             purposes=job.purposes,
             default_sky=job.default_sky,
             level=job.level,
+            gamma=job.gamma,
         )
         self.camera_path = job.camera or self.settings.camera
         self.size = self._size()

@@ -94,6 +94,7 @@ class Sky:
     factor: RGB
     rotation: tuple[float, ...]  # nine: the dome's X, Y, Z axes in the world, row by row
     visible: bool = False  # seen where there is no surface
+    shadow: bool = True  # whether the suns in its picture cast shadows
 
 
 @dataclass(frozen=True, slots=True)

@@ -290,13 +290,15 @@ def markdown(rows: Sequence[Row]) -> str:
 def write_gallery(rows: Iterable[Row], output: Path, gallery: Path, *, public: bool) -> None:
     """Contact sheets of the pictures below ``output`` and ``gallery.md`` into ``gallery``.
 
-    ``public``: without what may not be shown by its licence, and what is broken on purpose.
+    What is black as its materials has no tile. ``public``: without what may not be shown by
+    its licence, and what is broken on purpose.
     """
     hidden = PRIVATE if public else ()
     pictures, lines = [], ["| file | findings |", "| --- | --- |"]
     for row in rows:
         picture = _home(output, row) / "out" / "frame.png"
-        if row.code or row.problem or any(fnmatch(row.name, pattern) for pattern in hidden):
+        left_out = any(fnmatch(row.name, pattern) for pattern in hidden)
+        if row.code or row.problem or row.dark or left_out:
             continue
         pictures.append((row.name, picture))
         codes = ", ".join(f"{code} {count}" for code, count in sorted(row.codes.items()))

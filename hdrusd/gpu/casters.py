@@ -4,22 +4,27 @@ What stands still and stands once is merged into one buffer of world positions, 
 chunks of neighbouring triangles; what moves or is drawn many times keeps its own buffer and
 its matrices. A call draws a chunk into all tiles that see it.
 
-Nothing is cast by what a Draw or a shadow link excludes, by what emits (the lens of a lamp
-stands before it), and by what blends.
+Nothing is cast by what a Draw or a shadow link excludes, by what blends, by the glass of a
+lamp (gpu/lamp_glass.py), and by what is so far off that float32 and the depths of a map
+would be of no use to the rest: the finding "shadow-far".
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from hdrusd.errors import SourceRef
 from hdrusd.gpu.buffers import weld
+from hdrusd.gpu.lamp_glass import LampGlass, box_of, placed_boxes
 from hdrusd.gpu.program import Programs
 from hdrusd.gpu.textures import TextureCache
+from hdrusd.report import Kind, Report
 from hdrusd.scene import Draw, Geometry, Material, RenderScene, TextureUse
 
 Doubles = npt.NDArray[np.float64]
@@ -37,6 +42,10 @@ _MERGED = 200_000
 
 #: m; a caster farther out than this is broken.
 _FARTHEST = 1e9
+
+#: How far from the middle of the scene a caster may be, in m and, in a large scene, in median
+#: distances of what is in it.
+_REACH, _DISTANCES = 20_000.0, 1000.0
 
 #: Frames for which a buffer that nothing draws is kept.
 _KEEP = 2
@@ -134,18 +143,32 @@ class Group:
 
 
 class Casters:
-    """The casters of the current moment; keeps what was uploaded."""
+    """The casters of the current moment; keeps what was uploaded.
 
-    def __init__(self, ctx: moderngl.Context, programs: Programs, textures: TextureCache) -> None:
+    ``report`` takes one finding when some are too far off.
+    """
+
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        programs: Programs,
+        textures: TextureCache,
+        report: Report | None = None,
+        place: SourceRef | None = None,
+    ) -> None:
         self.ctx = ctx
         self.programs = programs
         self.textures = textures
         self.origin: Doubles = np.zeros(3)
+        self.reach = _REACH  # m from the origin, along each axis
         self.still: list[Group] = []
         self.moving: list[Group] = []
         self._links: tuple[int, ...] = ()
         self._known: list[_Caster] | None = None
         self._meshes: dict[tuple[str, Cutout | None], _Mesh] = {}
+        self._glass = LampGlass()
+        self._report, self._place = report, place or SourceRef(Path())
+        self._far = 0
         self._frame = 0
 
     def update(self, scene: RenderScene) -> bool:
@@ -155,7 +178,7 @@ class Casters:
         holes = [self._holes(material) for material in scene.materials]
         cast = [
             _Caster(draw, hole)
-            for draw in scene.draws
+            for draw in self._glass.removed(scene)
             if draw.casts and not isinstance(hole := holes[draw.material], _Nothing)
             if len(draw.geometry.points) > 0 and len(draw.transforms) > 0
         ]
@@ -167,7 +190,7 @@ class Casters:
             for group in self.still:
                 group.release()
             self._known = still
-            self.origin = _origin(still or moving)
+            self.origin, self.reach = _middle(scene, still or moving)
             self.still = self._still(still)
         self.moving = [self._placed(caster) for caster in moving]
         for group in self.still:
@@ -175,21 +198,35 @@ class Casters:
                 group.mesh.used = self._frame
         for key in [k for k, mesh in self._meshes.items() if mesh.used < self._frame - _KEEP]:
             self._meshes.pop(key).release()
+        self._say_far()
         return changed
 
     def bounds(self, *, moving: bool = True) -> Doubles:
-        """(2, 3) lowest and highest corner of all casters, m from the origin; zeros for none."""
+        """(2, 3) lowest and highest corner of all casters within ``reach``; zeros for none.
+
+        In m from the origin.
+        """
         groups = [*self.still, *(self.moving if moving else [])]
         boxes = [g.boxes for g in groups if len(g.boxes)]
         if not boxes:
             return np.zeros((2, 3))
         middle, half = np.concatenate(boxes).transpose(1, 0, 2)
-        return np.array([np.min(middle - half, axis=0), np.max(middle + half, axis=0)])
+        ends: Doubles = np.array([np.min(middle - half, axis=0), np.max(middle + half, axis=0)])
+        return ends.clip(-self.reach, self.reach)
+
+    def _say_far(self) -> None:
+        """Once, at the first frame in which something is beyond ``reach``."""
+        if self._far and self._report is not None:
+            text = (
+                f"{self._far} triangles and copies cast no shadows: they are farther than "
+                f"{self.reach:.3g} m from the middle of the scene"
+            )
+            self._report.add(Kind.DROPPED, "shadow-far", self._place, "", text)
+            self._report = None
 
     def _holes(self, material: Material) -> Cutout | _Nothing | None:
         """What of a material lets light through; None: nothing."""
-        emits = any(material.emission) or material.emission_map is not None
-        if emits or material.blend:
+        if material.blend:
             return _Nothing()
         use, threshold = material.opacity_map, material.opacity_threshold
         if use is None:
@@ -236,6 +273,11 @@ class Casters:
                 flat = np.concatenate([flat, uv], axis=1)
             corners.append(_sound(flat))
         triangles = np.concatenate(corners).reshape(-1, 3, 3 if cutout is None else 5)
+        places = triangles[..., :3]
+        inside = (places.min(axis=1) <= self.reach) & (places.max(axis=1) >= -self.reach)
+        within = np.all(inside, axis=1)
+        self._far += int(np.sum(~within))
+        triangles = triangles[within]
         if len(triangles) == 0:
             return None
         triangles = triangles[_neighbours(triangles[..., :3])]
@@ -261,13 +303,15 @@ class Casters:
         places[:, 3, :3] -= self.origin
         good = np.isfinite(places).all(axis=(1, 2)) & (np.abs(places).max(axis=(1, 2)) < _FARTHEST)
         places = places[good]
-        middle = mesh.box[0] @ places[:, :3, :3] + places[:, 3, :3]
-        half = mesh.box[1] @ np.abs(places[:, :3, :3])
+        boxes = placed_boxes(mesh.box, places)
+        within = np.all(np.abs(boxes[:, 0]) - boxes[:, 1] <= self.reach, axis=1)
+        self._far += int(np.sum(~within))
+        places, boxes = places[within], boxes[within]
         return Group(
             links=self._linked(draw),
             cutout=cutout,
             vao=mesh.vao,
-            boxes=np.stack([middle, half], axis=1),
+            boxes=boxes,
             starts=np.array([0, mesh.count]),
             transforms=places,
             mesh=mesh,
@@ -290,9 +334,7 @@ class Casters:
             vertices, indices = corners, np.arange(len(corners), dtype=np.uint32)
             kept.release()
         vao, buffers = self._buffers(vertices, indices, cutout is not None)
-        places = corners[:, :3] if len(corners) else np.zeros((1, 3), np.float32)
-        low, high = places.min(axis=0), places.max(axis=0)
-        box = np.array([low + high, high - low], np.float64) / 2.0
+        box = box_of(corners[:, :3])
         self._meshes[key] = _Mesh(geometry, vao, buffers, len(indices), box, self._frame)
         return self._meshes[key]
 
@@ -349,15 +391,29 @@ def _same(known: Sequence[_Caster], casters: Sequence[_Caster]) -> bool:
     )
 
 
-def _origin(casters: Sequence[_Caster]) -> Doubles:
-    """(3,) the median place of the draws: one that stands far off does not move it."""
-    places = [
+def _middle(scene: RenderScene, casters: Sequence[_Caster]) -> tuple[Doubles, float]:
+    """(3,) the median place of the draws within reach, and that reach in m.
+
+    One draw that stands far off moves neither: beside eye and lamps it is a minority.
+    """
+    placed = [
         np.array([*d.geometry.points[0].astype(np.float64), 1.0]) @ d.transforms[:, :, :3]
         for d in (caster.draw for caster in casters)
     ]
-    all_places = np.concatenate(places) if places else np.zeros((0, 3))
-    all_places = all_places[np.isfinite(all_places).all(axis=1)]
-    return np.round(np.median(all_places, axis=0)) if len(all_places) else np.zeros(3)
+    draws = _numbers(np.concatenate([np.zeros((0, 3)), *placed]))
+    lamps = scene.lights["position"][scene.lights["w"] > 0.0]
+    everything = _numbers(np.concatenate([draws, lamps, np.asarray(scene.camera.eye)[None]]))
+    if not len(draws) or not len(everything):
+        return np.zeros(3), _REACH
+    middle = np.median(everything, axis=0)
+    away = np.linalg.norm(everything - middle, axis=1)
+    reach = max(_REACH, _DISTANCES * float(np.median(away)))
+    near = draws[np.linalg.norm(draws - middle, axis=1) <= reach]
+    return np.round(np.median(near, axis=0) if len(near) else middle), reach
+
+
+def _numbers(places: Doubles) -> Doubles:
+    return places[np.isfinite(places).all(axis=1)]
 
 
 def _sound(corners: Doubles) -> Floats:

@@ -29,6 +29,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.errors import SourceRef
+from hdrusd.gpu.casters import Casters
 from hdrusd.gpu.light_tables import Extras
 from hdrusd.gpu.lights import PROFILE_UNIT, SAMPLES, SHADOW_UNIT, LightMode, LightPass
 from hdrusd.gpu.peeling import MAX_LAYERS, Peeling
@@ -41,7 +42,6 @@ from hdrusd.gpu.supersampling import Accumulator, offsets, shifted
 from hdrusd.gpu.surfaces import SurfacePass, set_used
 from hdrusd.gpu.textures import TextureCache
 from hdrusd.photometry.lightcut import EPSILON
-from hdrusd.photometry.sky import SH_TERMS
 from hdrusd.report import Kind, Report
 from hdrusd.scene import ImageData, RenderScene, TextureRef
 from hdrusd.units import TEXTURE_GAMMA
@@ -101,21 +101,29 @@ class HdrRenderer:
             self._shadows = ShadowMaps(
                 ctx, programs, textures, samples=SAMPLES, report=self.report, place=self.place
             )
+        self._casters: Casters | None = None  # where there are no shadow maps to have them
         self._occlusion = None
         if options.sky_samples:
+            if self._shadows is not None:
+                casters = self._shadows.casters
+            else:
+                casters = Casters(ctx, programs, textures, self.report, self.place)
+                self._casters = casters
             self._occlusion = SkyOcclusion(
                 ctx,
                 programs,
-                textures,
+                casters,
                 self.skies,
                 size,
                 self.scale,
                 options.sky_samples,
                 self.report,
+                self.place,
             )
+            self._scattered = self._texture()
         self._layers = {name: self._texture() for name in LAYERS[:-1]}
         self._depth = ctx.depth_texture(size)
-        self._gbuffer = ctx.framebuffer(list(self._layers.values()), self._depth)
+        self._gbuffer = self._attached()
         self._frame = ctx.framebuffer([self._layers["hdr"]], self._depth)
         self._distances = ctx.framebuffer([self._layers["g_normal"]], self._depth)
         self._peeling: Peeling | None = None
@@ -179,7 +187,7 @@ class HdrRenderer:
             layers.pop("g_extra", None)
         arriving = None
         if self._occlusion is not None:
-            self._occlusion.add(scene, layers, self._frame)
+            self._occlusion.add(scene, layers | {"g_scattered": self._scattered}, self._frame)
             arriving = self._occlusion.arriving
         self.skies.add_mirrored(scene, layers, self._frame, self.scale, arriving)
         self.lights.add(scene, layers, self._frame, extras, self._bind)
@@ -193,15 +201,22 @@ class HdrRenderer:
         if extra and "g_extra" not in self._layers:
             self._layers["g_extra"] = self._texture()
             self._gbuffer.release()
-            self._gbuffer = ctx.framebuffer(list(self._layers.values()), self._depth)
-            self._peeling = None
+            self._gbuffer = self._attached()
+            if self._peeling is not None:
+                self._peeling.release()
+                self._peeling = None
         # What else the G-buffer holds is read only where there is a surface.
         self._distances.clear(depth=1.0)
         self._frame.clear(*scene.background, 0.0)
         self._gbuffer.use()
         ctx.enable_only(moderngl.DEPTH_TEST)
         ctx.depth_func = "<"
-        self.surfaces.draw(scene, sky=self._sky(scene), extra="g_extra" in self._layers)
+        self.surfaces.draw(
+            scene,
+            sky=self.skies.lux_coefficients(scene) if scene.skies else None,
+            extra="g_extra" in self._layers,
+            sky_apart=self._occlusion is not None,
+        )
 
     def _add_blended(self, scene: RenderScene, extras: Extras, extra: bool) -> None:
         """Step four."""
@@ -247,17 +262,18 @@ class HdrRenderer:
         w, h = self.size
         return np.frombuffer(texture.read(), np.float32).reshape(h, w, 4)[::-1]
 
-    def _sky(self, scene: RenderScene) -> npt.NDArray[np.float32] | None:
-        """What the surfaces get of the sky as they are drawn; None: the scene's ambient alone."""
-        if self._occlusion is not None:
-            return np.zeros((SH_TERMS, 3), np.float32)  # it comes later, where it arrives
-        return self.skies.lux_coefficients(scene) if scene.skies else None
+    def _attached(self) -> moderngl.Framebuffer:
+        """The G-buffer, with what is scattered of the sky where that comes later."""
+        apart = [self._scattered] if self._occlusion is not None else []
+        return self.ctx.framebuffer([*self._layers.values(), *apart], self._depth)
 
     def _extras(self, scene: RenderScene) -> Extras:
         """What does not depend on where in a pixel is looked: profiles and shadows."""
         self._profiles.update(scene.profiles)
         profiles, kinds = self._profiles.of_lights(scene.lights)
         count = len(scene.lights)
+        if self._casters is not None:
+            self._casters.update(scene)
         if self._shadows is None:
             none = np.zeros((count, 0, 4), np.float32)
             return Extras(np.full(count, ""), none, kinds, profiles)

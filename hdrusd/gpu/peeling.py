@@ -19,6 +19,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from hdrusd.gpu.blending import blending
 from hdrusd.gpu.program import Programs
 from hdrusd.gpu.surfaces import Between, SurfacePass, set_used
 from hdrusd.scene import RenderScene
@@ -62,6 +63,7 @@ class Peeling:
         hdr, depth = _texture(ctx, size), ctx.depth_texture(size)
         # Only the distances of the layer before are read while one is drawn.
         self._layers = [_layer(ctx, _texture(ctx, size), shared, hdr, depth) for _ in range(2)]
+        self._depth = depth
         self._first = ctx.texture((1, 1), 4, _NOWHERE, dtype="f4")
         self._together = _texture(ctx, size)
         self._sum = ctx.framebuffer([self._together])
@@ -109,16 +111,24 @@ class Peeling:
         """All layers over the opaque surfaces in ``frame``."""
         self._composite(self._together, frame, (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA))
 
+    def release(self) -> None:
+        """Free what it has on the GPU."""
+        self._sum.release()
+        for layer in self._layers:
+            layer.gbuffer.release()
+            layer.frame.release()
+            layer.textures["g_normal"].release()
+        shared = [t for name, t in self._layers[0].textures.items() if name != "g_normal"]
+        for texture in (*shared, self._layers[0].hdr, self._depth, self._first, self._together):
+            texture.release()
+
     def _composite(
         self, layer: moderngl.Texture, onto: moderngl.Framebuffer, blend: tuple[int, int]
     ) -> None:
-        onto.use()
-        self.ctx.enable_only(moderngl.BLEND)
-        self.ctx.blend_func = blend
         layer.use(0)
         set_used(self._under.program, "layer", 0)
-        self._under.render(moderngl.TRIANGLES, vertices=3)
-        self.ctx.enable_only(moderngl.NOTHING)
+        with blending(self.ctx, onto, blend):
+            self._under.render(moderngl.TRIANGLES, vertices=3)
 
 
 def _layer(

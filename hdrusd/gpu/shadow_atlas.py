@@ -2,7 +2,8 @@
 
 The tiles of a light are equal squares side by side, its block. Blocks of the same height
 stand on shelves; heights are powers of two, so that a block that goes leaves room for the
-next one. What size a tile has depends on the frame alone, not on the frames before it.
+next one. What size a tile has depends on the frame alone while all lights fit; where some
+must go without, those that had tiles in the frame before keep them rather.
 """
 
 from __future__ import annotations

@@ -156,7 +156,6 @@ class TileDrawing:
         start: dict[str, int],
     ) -> None:
         ctx = self.ctx
-        target.framebuffer.use()
         ctx.enable_only(moderngl.DEPTH_TEST)
         boxes = max(sum(len(group.boxes) for group in groups), 1)
         together = min(max(_PAIRS // boxes, 1), _TOGETHER)
@@ -169,18 +168,21 @@ class TileDrawing:
                 for run in group.runs(seen_by(some, group), some.matrices)
             ]
             textures = table.upload(ctx)
+            target.framebuffer.use()
             self._start(len(some), start)
-            for distance in _CLIP_DISTANCES:
-                ctx.enable_direct(distance)
             ctx.depth_func = "<"
-            for run, at in calls:
-                self._call(run, at)
-            for distance in _CLIP_DISTANCES:
-                ctx.disable_direct(distance)
-            for texture in textures:
-                texture.release()
-        # A bound framebuffer must not be the one that ``resize`` releases.
-        ctx.extra["framebuffer"].use()
+            try:
+                for distance in _CLIP_DISTANCES:
+                    ctx.enable_direct(distance)
+                for run, at in calls:
+                    self._call(run, at)
+            finally:
+                for distance in _CLIP_DISTANCES:
+                    ctx.disable_direct(distance)
+                for texture in textures:
+                    texture.release()
+                # A bound framebuffer must not be the one that ``resize`` releases.
+                ctx.extra["framebuffer"].use()
 
     def _start(self, count: int, start: dict[str, int]) -> None:
         """Each tile filled: with the far plane, or with what was kept."""

@@ -119,7 +119,7 @@ class ShadowMaps:
         self.ctx = ctx
         self.samples = samples
         self.limit = min(limit, int(ctx.info["GL_MAX_TEXTURE_SIZE"]))
-        self.casters = Casters(ctx, programs, textures)
+        self.casters = Casters(ctx, programs, textures, report, place)
         self.left_out: npt.NDArray[np.intp] = np.zeros(0, np.intp)
         self._drawing = TileDrawing(ctx, programs)
         self._report, self._place = report, place or SourceRef(Path())
@@ -167,7 +167,7 @@ class ShadowMaps:
             del self._lamps[key]
         lamps = {i: lamp for i, lamp in lamps.items() if lamp.faces.any()}
         sizes = self._sizes(scene, lamps)
-        self._find_left_out(np.array([i for i in lamps if not sizes[i]], np.intp), len(lamps))
+        self._find_left_out(scene, [i for i in lamps if not sizes[i]], len(lamps))
         lamps = {i: lamp for i, lamp in lamps.items() if sizes[i]}
         self._settle({int(lights["key"][i]): (lamp, sizes[i]) for i, lamp in lamps.items()})
         self._draw(list(lamps.values()))
@@ -243,10 +243,7 @@ class ShadowMaps:
             return {}
         lights = scene.lights[list(lamps)]
         local = lights["w"] > 0.0
-        power = np.max(lights["intensity"], axis=1)
-        for number, profile in enumerate(scene.profiles):
-            of_it = lights["profile"] == number
-            power[of_it] *= np.max(profile.candela, initial=0.0)
+        power = _power(lights, scene)
         away = np.linalg.norm(lights["position"] - scene.camera.eye, axis=1)
         importance = np.sqrt(power) / np.maximum(np.maximum(away, lights["radius"]), 1e-3)
         importance = np.clip(importance, 1e-30, 1e30)
@@ -263,16 +260,22 @@ class ShadowMaps:
         )
         return dict(zip(lamps, sizes.tolist(), strict=True))
 
-    def _find_left_out(self, left_out: npt.NDArray[np.intp], among: int) -> None:
-        self.left_out = left_out
-        if len(left_out) == 0 or self._report is None or self._said:
+    def _find_left_out(self, scene: RenderScene, left_out: list[int], among: int) -> None:
+        self.left_out = np.array(left_out, np.intp)
+        if not left_out or self._report is None or self._said:
             return
         self._said = True
-        listed = ", ".join(str(i) for i in left_out[:10])
-        more = ", ..." if len(left_out) > 10 else ""
+        first = scene.lights[left_out[:3]]
+        listed = ", ".join(
+            f"({', '.join(f'{v:.6g}' for v in light['position'])}) m with {power:.3g} cd"
+            if light["w"] > 0.0
+            else f"a distant one with {power:.3g} lx"
+            for light, power in zip(first, _power(first, scene), strict=True)
+        )
+        more = ", ..." if len(left_out) > 3 else ""
         text = (
             f"{len(left_out)} of {among} lights shine without shadows in the first such frame: no "
-            f"room in a shadow map of {self.limit} x {self.limit}; by number: {listed}{more}"
+            f"room in a shadow map of {self.limit} x {self.limit}; at {listed}{more}"
         )
         self._report.add(Kind.DROPPED, "shadow-budget", self._place, "", text)
 
@@ -321,6 +324,14 @@ class ShadowMaps:
             self._drawing.keep(join(keep), self.casters.still)
         if again:
             self._drawing.redraw(join(again), self.casters.moving)
+
+
+def _power(lights: Lights, scene: RenderScene) -> Doubles:
+    """(n,) cd or lux of the brightest channel, in the brightest direction."""
+    power: Doubles = np.max(lights["intensity"], axis=1)
+    for number, profile in enumerate(scene.profiles):
+        power[lights["profile"] == number] *= np.max(profile.candela, initial=0.0)
+    return power
 
 
 def _faces(view: View | DistantView, seen: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:

@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.errors import SourceRef
+from hdrusd.gpu.blending import blending
 from hdrusd.gpu.lights import window_uniforms
 from hdrusd.gpu.program import Programs
 from hdrusd.gpu.surfaces import set_used
@@ -192,14 +193,8 @@ class SkyPass:
             set_used(program, name, value)
         if program not in self._vaos:
             self._vaos[program] = self.ctx.vertex_array(program, [])
-        frame.use()
-        frame.depth_mask = False
-        self.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
-        self.ctx.depth_func = depth
-        self.ctx.blend_func = moderngl.ONE, moderngl.ONE
-        self._vaos[program].render(moderngl.TRIANGLES, vertices=3)
-        frame.depth_mask = True
-        self.ctx.enable_only(moderngl.NOTHING)
+        with blending(self.ctx, frame, depth=depth):
+            self._vaos[program].render(moderngl.TRIANGLES, vertices=3)
 
     # -- pictures ------------------------------------------------------------------------
 
@@ -315,7 +310,7 @@ def _sun_rows(sky: Sky, suns: list[Sun]) -> npt.NDArray[np.void]:
     directions = np.array([sun.direction for sun in suns]) @ np.reshape(sky.rotation, (3, 3))
     rows["w"], rows["position"], rows["axis"] = 0.0, directions, -directions
     rows["intensity"] = np.array([sun.lux for sun in suns]) * sky.factor
-    rows["angle"] = [sun.angle for sun in suns]
+    rows["angle"], rows["shadow"] = [sun.angle for sun in suns], sky.shadow
     return rows
 
 

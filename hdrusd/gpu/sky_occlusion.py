@@ -25,13 +25,13 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.errors import SourceRef
+from hdrusd.gpu.blending import blending
 from hdrusd.gpu.casters import Casters
 from hdrusd.gpu.lights import window_uniforms
 from hdrusd.gpu.program import Programs
 from hdrusd.gpu.shadow_drawing import TileDrawing, Tiles
 from hdrusd.gpu.sky import SkyPass
 from hdrusd.gpu.surfaces import set_used
-from hdrusd.gpu.textures import TextureCache
 from hdrusd.report import Kind, Report
 from hdrusd.scene import RenderScene
 
@@ -52,18 +52,23 @@ _FARTHEST = 1000.0
 
 
 class SkyOcclusion:
-    """Adds the sky's diffuse light; surfaces must have been drawn without it."""
+    """Adds the sky's diffuse light; surfaces must have been drawn with it apart.
+
+    ``casters``: taken as they are, of the moment that is drawn. ``report`` takes one finding
+    with the size of a texel in the first frame.
+    """
 
     def __init__(
         self,
         ctx: moderngl.Context,
         programs: Programs,
-        textures: TextureCache,
+        casters: Casters,
         skies: SkyPass,
         size: tuple[int, int],
         scale: float,
         samples: int,
         report: Report,
+        place: SourceRef | None = None,
     ) -> None:
         self.ctx = ctx
         self.programs = programs
@@ -71,8 +76,10 @@ class SkyOcclusion:
         self.size = size
         self.scale = scale
         self.report = report
+        self.place = place or SourceRef(Path())
+        self._said = False
         self.directions = even_directions(samples)
-        self._casters = Casters(ctx, programs, textures)
+        self._casters = casters
         self._tiles = TileDrawing(ctx, programs)
         #: Sums of sky_occlusion.frag, for ``SkyPass.add_mirrored``; after ``add``.
         self.arriving = ctx.texture(size, 4, dtype="f4")
@@ -88,14 +95,13 @@ class SkyOcclusion:
     ) -> None:
         """The sky's light on the surfaces of a G-buffer, into ``frame`` (blended).
 
-        ``layers``: the G-buffer by the names of its samplers.
+        ``layers``: the G-buffer by the names of its samplers, with g_scattered.
         """
         box = self._surfaces(scene, layers["g_normal"])
         luminance = self.skies.luminance(scene, self.directions)
         bright = np.any(luminance > 0.0, axis=1)
         if box is None or not bright.any():
             return
-        self._casters.update(scene)
         self._sum.use()
         self._sum.clear()
         self._look_up(scene, layers, box, self.directions[bright], luminance[bright])
@@ -149,14 +155,11 @@ class SkyOcclusion:
             }
             # A batch that is not full is filled with darkness.
             full = {name: _filled(value) for name, value in values.items()}
-            self._sum.use()
-            self.ctx.enable_only(moderngl.BLEND)
-            self.ctx.blend_func = moderngl.ONE, moderngl.ONE
             self._tiles.use(len(layers))
             values = {"inverse_size": 1.0 / np.array(size), **full}
             units = {"depths": len(layers), "texel": views.texel}
-            self._draw(program, scene, layers, units | values)
-        self.ctx.enable_only(moderngl.NOTHING)
+            with blending(self.ctx, self._sum):
+                self._draw(program, scene, layers, units | values)
 
     def _finish(
         self,
@@ -164,22 +167,15 @@ class SkyOcclusion:
         layers: Mapping[str, moderngl.Texture],
         frame: moderngl.Framebuffer,
     ) -> None:
-        defines = {"COATED": 1} if "g_extra" in layers else {}
-        program = self.programs.get("gpu/shaders/sky.vert", "gpu/shaders/sky_light.frag", defines)
+        program = self.programs.get("gpu/shaders/sky.vert", "gpu/shaders/sky_light.frag", {})
         self.arriving.use(len(layers))
-        frame.use()
-        frame.depth_mask = False
-        self.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
-        self.ctx.depth_func = ">"
-        self.ctx.blend_func = moderngl.ONE, moderngl.ONE
         values = {
             "arriving": len(layers),
             "sky_lux": self.skies.lux_coefficients(scene),
             "lambert_scale": self.scale,
         }
-        self._draw(program, scene, layers, values)
-        frame.depth_mask = True
-        self.ctx.enable_only(moderngl.NOTHING)
+        with blending(self.ctx, frame, depth=">"):
+            self._draw(program, scene, layers, values)
 
     def _draw(
         self,
@@ -201,8 +197,10 @@ class SkyOcclusion:
         self._vaos[program].render(moderngl.TRIANGLES, vertices=3)
 
     def _say(self, texel: float) -> None:
-        text = f"sky light is shaded by what is larger than {texel:.2g} m"
-        self.report.add(Kind.ASSUMED, "sky-occlusion", SourceRef(Path()), "", text)
+        if not self._said:
+            self._said = True
+            text = f"sky light is shaded by what is larger than {texel:.2g} m in the first frame"
+            self.report.add(Kind.ASSUMED, "sky-occlusion", self.place, "", text)
 
 
 class Views:

@@ -13,6 +13,7 @@ from math import gcd
 
 import moderngl
 
+from hdrusd.gpu.blending import blending
 from hdrusd.gpu.program import Programs
 from hdrusd.scene import Camera
 
@@ -58,10 +59,7 @@ class Accumulator:
     def add(self, frame: moderngl.Texture, weight: float) -> None:
         """Add ``weight`` times a frame of the same size."""
         vao = self.programs.fullscreen("gpu/shaders/accumulate.frag")
-        self._frame.use()
-        self.ctx.enable_only(moderngl.BLEND)
-        self.ctx.blend_func = moderngl.ONE, moderngl.ONE
         frame.use(0)
         vao.program["frame"], vao.program["weight"] = 0, weight
-        vao.render(moderngl.TRIANGLES, vertices=3)
-        self.ctx.enable_only(moderngl.NOTHING)
+        with blending(self.ctx, self._frame):
+            vao.render(moderngl.TRIANGLES, vertices=3)

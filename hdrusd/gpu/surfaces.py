@@ -94,13 +94,15 @@ class SurfacePass:
         *,
         sky: npt.NDArray[np.float32] | None = None,
         extra: bool = False,
+        sky_apart: bool = False,
         between: Between | None = None,
     ) -> None:
         """The surfaces of a scene; depth test on, colour attachments as in gbuffer.frag.
 
         ``sky``: (18, 3) coefficients of ``ambient_lux`` (photometry/sky.py) instead of
-        ``scene.ambient``. ``extra``: g_extra is attached, and written. ``between``: only
-        the parts between two layers.
+        ``scene.ambient``. ``extra``: g_extra is attached, and written. ``sky_apart``:
+        so is g_scattered, and no light of the sky is added. ``between``: only the parts
+        between two layers.
         """
         self._prepare(scene)
         defines: dict[str, Define] = {}
@@ -110,6 +112,8 @@ class SurfacePass:
             shared["sky"] = floats(sky)
         if extra:
             defines["EXTRA"] = 1
+        if sky_apart:  # the last of the attachments
+            defines["SKY_APART"] = 5 if extra else 4
         if between is not None:
             defines["PEEL"] = 1
             between.opaque.use(_OPAQUE_UNIT)
@@ -117,7 +121,11 @@ class SurfacePass:
             shared["opaque"] = np.int32(_OPAQUE_UNIT).tobytes()
             shared["before"] = np.int32(_BEFORE_UNIT).tobytes()
             shared["pixel"] = floats([1.0 / side for side in between.opaque.size])
-        self._run(self._calls[which == "blended"], defines, shared)
+        try:
+            self._run(self._calls[which == "blended"], defines, shared)
+        finally:
+            self.ctx.disable(moderngl.CULL_FACE)
+            self.ctx.front_face = "ccw"
 
     def blended(self, scene: RenderScene) -> bool:
         """Whether anything is in view that something may be seen through."""
@@ -151,10 +159,14 @@ class SurfacePass:
     def _read_materials(self, scene: RenderScene) -> bool:
         """Whether what was uploaded brings what the materials need."""
         inputs, fits = [], True
-        self.textures.prepare(scene.materials)
+        replaced = self.textures.prepare(scene.materials)
         for number, material in enumerate(scene.materials):
             known = self._inputs[number] if number < len(self._inputs) else None
-            if known is None or known.material is not material:
+            if (
+                known is None
+                or known.material is not material
+                or any(use.texture in replaced for use in material.maps().values())
+            ):
                 new = material_inputs(material, self.textures)
                 fits &= known is not None and new.layout == known.layout
                 self._programs.clear()
@@ -287,8 +299,6 @@ class SurfacePass:
             ctx.front_face = "cw" if state.mirrored else "ccw"
             vao = call.batch.vertex_array(ctx, program)
             vao.render(moderngl.TRIANGLES, instances=call.instances)
-        ctx.disable(moderngl.CULL_FACE)
-        ctx.front_face = "ccw"
 
     def _program(
         self, state: State, variant: tuple[str, ...], defines: dict[str, Define]

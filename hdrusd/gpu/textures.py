@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
@@ -24,6 +24,10 @@ _THREADS, _AHEAD = 2, 4
 
 #: Texels a turn while a large image is made smaller.
 _STRIP = 2**22
+
+#: Lists of materials for which a texture that none of them names is kept; and one that another
+#: has replaced, which casters may hold until they are looked at anew.
+_KEEP = 2
 
 #: Samples along the longer side of a pixel's footprint. A software device takes 25 times as
 #: long for them: 400 ns a texel instead of 16 (llvmpipe of Mesa 22.3).
@@ -94,8 +98,17 @@ def _channel(pixels: Texels, channel: int, gamma: float, dtype: Any) -> Any:
     return plane if gamma == 1.0 else np.maximum(plane, 0.0) ** gamma
 
 
+@dataclass(slots=True)
+class _Known:
+    """A material; kept, so that its identity stays its own. ``last``: list that it was in."""
+
+    material: Material
+    refs: frozenset[TextureRef]
+    last: int
+
+
 class TextureCache:
-    """Textures by what they refer to; a file is decoded once.
+    """Textures by what they refer to; a file is decoded once while materials name it.
 
     ``load`` is called from several threads at once.
     """
@@ -112,15 +125,30 @@ class TextureCache:
         self.anisotropy = 1.0 if describe(ctx)["software"] else min(ANISOTROPY, ctx.max_anisotropy)
         self._kept: dict[TextureRef, Uploaded | None] = {}
         self._holds: dict[TextureRef, int | None] = {}  # the one channel, or None for all
-        self._seen: dict[int, Material] = {}  # by identity; kept, so that it stays theirs
+        self._seen: dict[int, _Known] = {}  # by identity
+        self._materials: Sequence[Material] = ()
+        self._list = 0  # how many lists of materials there were
+        self._used: dict[TextureRef, int] = {}  # the last list
+        self._retired: list[tuple[int, moderngl.Texture]] = []
 
-    def prepare(self, materials: Iterable[Material]) -> None:
-        """Upload all that materials need, decoded in threads; what is there stays.
+    def prepare(self, materials: Sequence[Material]) -> frozenset[TextureRef]:
+        """Upload all that materials need, decoded in threads; what they need no more goes.
 
         A texture of which one channel is read takes a quarter of the memory, and half the
-        time to read on a software device.
+        time to read on a software device. Returns those of which there is another texture
+        now: what holds the one before must let go of it.
         """
+        if materials is self._materials:
+            return frozenset()
+        self._materials = materials
+        self._list += 1
         missing = self._missing(self._wanted(materials))
+        replaced = frozenset(ref for ref, _ in missing if self._kept.get(ref) is not None)
+        self._upload_all(missing)
+        self._forget()
+        return replaced
+
+    def _upload_all(self, missing: Sequence[tuple[TextureRef, Wanted]]) -> None:
         if len(missing) < 2:
             for ref, wanted in missing:
                 self._keep(ref, wanted, self._decode(ref, wanted))
@@ -139,19 +167,42 @@ class TextureCache:
         if ref not in self._kept:
             wanted = Wanted({0, 1, 2, 3})
             self._keep(ref, wanted, self._decode(ref, wanted))
+        self._used[ref] = self._list
         return self._kept[ref]
 
     def _wanted(self, materials: Iterable[Material]) -> dict[TextureRef, Wanted]:
         """What materials not seen before read, by texture."""
         found: dict[TextureRef, Wanted] = {}
         for material in materials:
-            if id(material) in self._seen:
+            known = self._seen.get(id(material))
+            if known is not None:
+                known.last = self._list
                 continue
-            self._seen[id(material)] = material
-            for use in material.maps().values():
+            uses = material.maps().values()
+            refs = frozenset(use.texture for use in uses)
+            self._seen[id(material)] = _Known(material, refs, self._list)
+            for use in uses:
                 wanted = found.setdefault(use.texture, Wanted(fallback=use.fallback))
                 wanted.channels |= {use.channel} if use.channel >= 0 else {0, 1, 2}
         return found
+
+    def _forget(self) -> None:
+        """Release what no material of the last lists names, and what was replaced before."""
+        oldest = self._list - _KEEP
+        self._seen = {key: known for key, known in self._seen.items() if known.last >= oldest}
+        for known in self._seen.values():
+            for ref in known.refs:
+                self._used[ref] = max(self._used.get(ref, 0), known.last)
+        # What could not be had takes nothing, and is not looked for again.
+        for ref in [r for r, made in self._kept.items() if made and self._used[r] < oldest]:
+            made = self._kept.pop(ref)
+            assert made is not None
+            made.texture.release()
+            del self._holds[ref], self._used[ref]
+        for at, texture in self._retired:
+            if at < oldest:
+                texture.release()
+        self._retired = [(at, texture) for at, texture in self._retired if at >= oldest]
 
     def _missing(self, found: dict[TextureRef, Wanted]) -> list[tuple[TextureRef, Wanted]]:
         """Those of which nothing is kept, or not every channel that is wanted now."""
@@ -225,6 +276,9 @@ class TextureCache:
         self._keep(ref, wanted, made.result())
 
     def _keep(self, ref: TextureRef, wanted: Wanted, placed: _Placed | None) -> None:
+        before = self._kept.get(ref)
+        if before is not None:
+            self._retired.append((self._list, before.texture))
         self._kept[ref] = None if placed is None else self._upload(placed)
         self._holds[ref] = None if placed is None else wanted.channel
 

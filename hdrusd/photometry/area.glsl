@@ -97,11 +97,14 @@ float circle_illuminance(vec3 p, vec3 n, vec3 axis, float r2)
     float height = -dot(axis, p);
     vec3 side = p + height * axis;
     float h2 = height * height, q2 = dot(side, side);
-    float s = h2 + q2 + r2;
-    float b = q2 - h2 - r2;
+    float s = max(h2 + q2 + r2, 1e-30);
+    h2 /= s;
+    q2 /= s;
+    float b = q2 - h2 - r2 / s;
     float d = sqrt(max(b * b + 4.0 * q2 * h2, 1e-30));
     float w = b > 0.0 ? 4.0 * q2 * h2 / (d + abs(b)) : d - b;
-    return max(2.0 * height * dot(n, side) - dot(n, axis) * w, 0.0) / (d * (d + s));
+    float across = 2.0 * height * (dot(n, side) / s);
+    return max(across - dot(n, axis) * w, 0.0) / (d * (d + 1.0) * s);
 }
 
 // Polygon of AREA_SIDES sides with the area of an elliptic disk.

@@ -153,18 +153,19 @@ def circle_illuminance(p: Array, n: Array, axis: Array, r2: Array) -> Array:
     D^2 = S^2 - 4 q^2 r^2, the contour integral over the angle, int dw / (S + 2 q r cos w) and
     its like, gives E = L pi r^2 (n_z (D + S - 2 q^2) + 2 h n_q q) / (D (D + S)): for a parallel
     disk Foote's formula (1915, Bull. Bur. Stand. 12). D + S - 2 q^2 = 4 q^2 h^2 / (D + q^2 -
-    h^2 - r^2), so nothing cancels however far it is.
+    h^2 - r^2), so nothing cancels however far it is. All squares are shares of S, whose own
+    square overflows float32 where it is 4e9 m away.
     """
     height = -dot(axis, p)
     side = p + height[..., None] * axis
     h2, q2 = height * height, dot(side, side)
-    s = h2 + q2 + r2
-    b = q2 - h2 - r2
+    s = np.maximum(h2 + q2 + r2, 1e-30)
+    h2, q2 = h2 / s, q2 / s
+    b = q2 - h2 - r2 / s
     d = np.sqrt(np.maximum(b * b + 4.0 * q2 * h2, 1e-30))
     w = np.where(b > 0.0, 4.0 * q2 * h2 / (d + np.abs(b)), d - b)
-    return np.asarray(
-        np.maximum(2.0 * height * dot(n, side) - dot(n, axis) * w, 0.0) / (d * (d + s))
-    )
+    across = 2.0 * height * (dot(n, side) / s)
+    return np.asarray(np.maximum(across - dot(n, axis) * w, 0.0) / (d * (d + 1.0) * s))
 
 
 def ellipse_illuminance(p: Array, n: Array, x: Array, y: Array) -> Array:

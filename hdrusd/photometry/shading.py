@@ -19,6 +19,18 @@ from hdrusd.photometry.area import (
     rect_illuminance,
     sphere_illuminance,
 )
+from hdrusd.photometry.highlight import (
+    STRAIGHT,
+    blinn_alpha2,
+    cylinder_point,
+    disk_point,
+    highlight_share,
+    lobe_share,
+    rect_point,
+    sphere_point,
+    sphere_spread,
+    spread,
+)
 from hdrusd.photometry.light import (
     cone_factor,
     focus_factor,
@@ -68,6 +80,8 @@ class Arrival:
     lux: Array  # (..., 3) on it, for what it reflects to all sides
     gloss_lux: Array  # (..., 3) the same for its highlight
     toward: Array  # (..., 3) unit vector that the highlight takes for the way to the light
+    middle: Array  # (...) N.L of the light's centre
+    spread: Array  # (..., 2) by how much its size moves the half vector (highlight.py); 0: none
 
 
 def _point(light: np.void, to: Array, normal: Array) -> Array:
@@ -106,7 +120,8 @@ def arrive(light: np.void, surface: Surface, profiles: Sequence[Profile]) -> Arr
     """What a light gives: E = I f(theta) cos / d^2 of a lamp without size, else by area.py.
 
     Cone, focus and profile of a light that has a size are those of the direction from its
-    centre, and so is its highlight.
+    centre. Its highlight is that of its representative point (highlight.py); what lies below
+    the highlight gets 1 - F of that point too.
     """
     to = light_vector(light["position"], light["w"], surface.position)
     toward = to / np.sqrt(np.maximum(np.sum(to * to, axis=-1), 1e-20))[..., None]
@@ -122,7 +137,37 @@ def arrive(light: np.void, surface: Surface, profiles: Sequence[Profile]) -> Arr
     if light["profile"] >= 0:
         received = received * _candela(light, toward, profiles[int(light["profile"])])
     lux = light["intensity"] * np.asarray(received)[..., None]
-    return Arrival(lux, lux, toward)
+    middle = np.sum(surface.normal * toward, axis=-1)
+    point, moved = represented(light, to, surface)
+    point = point / np.sqrt(np.maximum(np.sum(point * point, axis=-1), 1e-20))[..., None]
+    return Arrival(lux, lux, point, middle, moved)
+
+
+def represented(light: np.void, to: Array, surface: Surface) -> tuple[Array, Array]:
+    """(..., 3) to the point of a light that stands for it in a highlight, (..., 2) its spread.
+
+    ``to`` (..., 3): to its centre. The spread is times k of ``lobe_share``.
+    """
+    nv = np.sum(surface.normal * surface.view, axis=-1, keepdims=True)
+    ray = 2.0 * nv * surface.normal - surface.view
+    view, x, y, radius = surface.view, light["x"], light["y"], light["radius"]
+    straight = np.array([STRAIGHT, STRAIGHT**2])
+    if light["w"] == 0.0:
+        sine = np.sin(light["angle"])
+        return sphere_point(to, ray, sine), sphere_spread(to, view, sine)
+    shape = int(shines_as(light))
+    if shape == RECT:
+        return rect_point(to, ray, light["axis"], x, y), straight * spread(to, view, x, y)
+    if shape == DISK:
+        return disk_point(to, ray, light["axis"], x, y), spread(to, view, x, y)
+    if shape == SPHERE:
+        return sphere_point(to, ray, radius), sphere_spread(to, view, radius)
+    if shape == CYLINDER:
+        across = np.cross(x, to)
+        size = np.sqrt(np.maximum(np.sum(across * across, axis=-1, keepdims=True), 1e-20))
+        moved = spread(to, view, x, radius * across / size)
+        return cylinder_point(to, ray, x, radius), straight * moved
+    return to, np.zeros((*to.shape[:-1], 2))
 
 
 def _candela(light: np.void, toward: Array, profile: Profile) -> Array:
@@ -202,6 +247,7 @@ def reflect(
     lv = np.sum(arrival.toward * surface.view, axis=-1)
     exponent = np.where(is_ggx, 0.0, surface.gloss)
     lobe = specular * blinn_phong(half_cosine(nl, nv, lv), exponent, scale)
+    lobe = lobe * _of_size(arrival, nl, blinn_alpha2(exponent))
     legacy = arrival.lux * matte + arrival.gloss_lux * surface.specular * lobe[..., None]
 
     sine2, vh = np.moveaxis(
@@ -214,13 +260,17 @@ def reflect(
     alpha = np.where(is_ggx, -surface.gloss, 1.0)
     # Both reflections are layered alike, but a light may give them different lux.
     dull = layered(layered(matte, f, np.zeros(nl.shape)), on, np.zeros(nl.shape))
-    bright = layered(
-        layered(np.zeros(3), f, _lobe(alpha, nl, nv, sine2, scale)),
-        on,
-        _lobe(surface.coat[..., 1], nl, nv, sine2, scale),
-    )
+    lobes = [
+        _lobe(width, nl, nv, sine2, scale) * _of_size(arrival, nl, np.square(width))
+        for width in (alpha, surface.coat[..., 1])
+    ]
+    bright = layered(layered(np.zeros(3), f, lobes[0]), on, lobes[1])
     modern = arrival.lux * dull + arrival.gloss_lux * specular * bright
     return np.where(is_ggx[..., None], modern, legacy)
+
+
+def _of_size(arrival: Arrival, nl: Array, alpha2: Array) -> Array:
+    return highlight_share(lobe_share(arrival.spread, 1.0, alpha2), nl, arrival.middle)
 
 
 def _lobe(alpha: Array, nl: Array, nv: Array, sine2: Array, scale: float) -> Array:

@@ -16,6 +16,7 @@ from hdrusd.report import Kind, Report
 from hdrusd.scene import RGB, Sky
 from hdrusd.usd.dome import dome_picture, read_sky
 from hdrusd.usd.light import read_dome
+from hdrusd.usd.light_bounds import STRONGEST
 
 API = "HdrusdAmbientAPI"
 
@@ -86,9 +87,9 @@ def _stated(root: Usd.Prim, time: Usd.TimeCode) -> npt.NDArray[np.float64] | Non
 
 
 def _sound(lux: npt.NDArray[np.float64], prim: Usd.Prim, report: Report) -> npt.NDArray[np.float64]:
-    if np.isfinite(lux).all() and (lux >= 0.0).all():
+    if ((lux >= 0.0) & (lux <= STRONGEST)).all():
         return lux
-    text = "not finite or negative; left out"
+    text = "not finite, negative or too large; left out"
     report.add(Kind.INVALID, "light-invalid", _place(prim), str(prim.GetPath()), text)
     return np.zeros(3)
 

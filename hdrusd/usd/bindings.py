@@ -55,6 +55,9 @@ class Bindings:
         rest = np.ones(len(counts or []), np.bool_)
         pieces = []
         for subset in subsets:
+            if subset.GetIndicesAttr().ValueMightBeTimeVarying():
+                text = "its faces change in time; those of the first time shown are used"
+                self._finding(subset.GetPrim(), Kind.DROPPED, "subset-animated", text)
             index = np.asarray(subset.GetIndicesAttr().Get(code) or [], np.int64)
             index = index[(index >= 0) & (index < rest.size)]
             faces = np.zeros(rest.size, np.bool_)
@@ -105,7 +108,11 @@ class Bindings:
         """The opacity that a gprim's primvar gives it as a whole; None where it has none."""
         if not name or not _has(prim, name):
             return None
-        value = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name).ComputeFlattened(code)
+        primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
+        if primvar.ValueMightBeTimeVarying():
+            text = f"{name} changes in time; that of the first time shown is used"
+            self._finding(prim, Kind.DROPPED, "opacity-animated", text)
+        value = primvar.ComputeFlattened(code)
         values = np.ravel(np.asarray(value if value is not None else []))
         if values.size == 0 or values.dtype.kind not in "fiu" or not np.isfinite(values).all():
             self._finding(prim, Kind.INVALID, "display-opacity", f"{name} is no finite number")
@@ -147,9 +154,21 @@ def _has(prim: Usd.Prim, name: str) -> bool:
 
 
 def _varies(material: Usd.Prim) -> bool:
-    """Whether any value of a material's own network may change in time."""
-    return any(
-        attribute.ValueMightBeTimeVarying()
-        for prim in Usd.PrimRange(material, Usd.TraverseInstanceProxies())
-        for attribute in prim.GetAuthoredAttributes()
-    )
+    """Whether any value of a material's network may change in time, wherever its nodes are."""
+    network = Usd.PrimRange(material, Usd.TraverseInstanceProxies())
+    pending = [attribute for prim in network for attribute in prim.GetAuthoredAttributes()]
+    known: set[Sdf.Path] = set()
+    while pending:
+        attribute = pending.pop()
+        if attribute.GetPath() in known:
+            continue
+        known.add(attribute.GetPath())
+        if attribute.ValueMightBeTimeVarying():
+            return True
+        for path in attribute.GetConnections():
+            source = material.GetStage().GetAttributeAtPath(path)
+            if source and UsdShade.Output.IsOutput(source):  # of a node, which reads its inputs
+                pending += source.GetPrim().GetAuthoredAttributes()
+            if source:
+                pending.append(source)
+    return False

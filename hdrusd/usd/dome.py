@@ -19,6 +19,7 @@ from hdrusd.report import Kind, Report
 from hdrusd.scene import RGB, Sky, TextureRef
 from hdrusd.units import dome_luminance
 from hdrusd.usd.assets import resolved_asset
+from hdrusd.usd.light_controls import casts_shadows
 from hdrusd.usd.lux import input_source
 
 #: Formats read as lat-long. What "automatic" looks for in a file is RenderMan's own.
@@ -54,7 +55,12 @@ def read_sky(
     if _pole(prim) == "Z":
         axes = np.stack([axes[0], axes[2], -axes[1]])
     texture = TextureRef(picture, "auto", "repeat", "clamp")
-    return Sky(texture, (red, green, blue), tuple(float(v) for v in axes.ravel()))
+    return Sky(
+        texture,
+        (red, green, blue),
+        tuple(float(v) for v in axes.ravel()),
+        shadow=casts_shadows(prim, time),
+    )
 
 
 def dome_picture(prim: Usd.Prim, time: Usd.TimeCode) -> str:

@@ -19,6 +19,7 @@ from hdrusd.scene import (
     CYLINDER,
     DISK,
     NO_CONE,
+    POINT,
     RECT,
     RGB,
     SPHERE,
@@ -28,12 +29,16 @@ from hdrusd.scene import (
     Profile,
     TextureUse,
 )
+from hdrusd.usd.light_bounds import seen_area
 
 Rows = npt.NDArray[np.void]
 Doubles = npt.NDArray[np.float64]
 
 #: Shape, material, and whether it moves.
 _Key = tuple[int, int, bool]
+
+#: Draw of a mesh by its number, material, and whether it moves.
+_GlowKey = tuple[int, int, bool]
 
 #: Sides of round lamps.
 SIDES = 64
@@ -55,6 +60,8 @@ class Emitters:
         self._shown: list[tuple[Rows, TextureUse | None, bool]] = []
         self._glows: list[_Glow] = []
         self._kept: dict[_Key, Draw] = {}
+        self._glowing: dict[_GlowKey, tuple[Draw, Draw]] = {}  # the mesh's own, and as it glows
+        self._materials: dict[Material, Material] = {}  # of the last moment, by their values
 
     def clear(self) -> None:
         """Forget the lights, for the next moment."""
@@ -73,11 +80,12 @@ class Emitters:
     ) -> tuple[tuple[Draw, ...], tuple[Material, ...]]:
         """The draws, and their materials, which have the numbers from ``first_material`` on.
 
-        Those that nothing moves are the same objects at every time.
+        Those that nothing moves are the same objects at every time; materials are too.
         """
         materials: dict[Material, int] = {}
         places: dict[tuple[int, int, bool], list[Doubles]] = {}
-        for rows, texture, moving in self._shown:
+        # Still ones first: what moving ones add does not renumber their materials.
+        for rows, texture, moving in sorted(self._shown, key=lambda shown: shown[2]):
             rows = rows[_seen(rows)]
             alike = np.column_stack([rows["shape"], _luminance(rows, profiles)])
             kinds, which = np.unique(alike, axis=0, return_inverse=True)
@@ -90,14 +98,21 @@ class Emitters:
             self._draw(kept, (shape, first_material + number, moving), np.concatenate(at))
             for (shape, number, moving), at in places.items()
         ]
+        glowed, self._glowing = self._glowing, {}
         for glow in self._glows:
+            number = materials.setdefault(_material(glow.luminance, None), len(materials))
             for draw in glow.draws:
-                number = materials.setdefault(_material(glow.luminance, None), len(materials))
-                moving = glow.moving or draw.moving
-                draws.append(
-                    replace(draw, material=first_material + number, moving=moving, casts=False)
-                )
-        return tuple(draws), tuple(materials)
+                key = id(draw), first_material + number, glow.moving or draw.moving
+                draws.append(self._glow(glowed, key, draw))
+        self._materials = {made: self._materials.get(made, made) for made in materials}
+        return tuple(draws), tuple(self._materials.values())
+
+    def _glow(self, kept: dict[_GlowKey, tuple[Draw, Draw]], key: _GlowKey, draw: Draw) -> Draw:
+        if key not in kept:
+            _, material, moving = key
+            kept[key] = draw, replace(draw, material=material, moving=moving, casts=False)
+        self._glowing[key] = kept[key]  # with the mesh's own, whose number is thus not given again
+        return kept[key][1]
 
     def _draw(self, kept: dict[_Key, Draw], key: _Key, places: Doubles) -> Draw:
         shape, material, moving = key
@@ -108,27 +123,27 @@ class Emitters:
         return draw
 
 
-def _seen(rows: Rows) -> npt.NDArray[np.bool_]:
-    shape = rows["shape"]
-    flat = (shape == RECT) | (shape == DISK) | (shape == CYLINDER)
+def beamed_balls(rows: Rows) -> npt.NDArray[np.bool_]:
+    """(n,) which lamps shine, have a size, and are not seen: balls with a beam."""
     beam = (rows["outer"] < NO_CONE) | (rows["exponent"] > 0.0) | (rows["profile"] >= 0)
+    return np.asarray((rows["shape"] == SPHERE) & beam & _shining(rows))
+
+
+def _seen(rows: Rows) -> npt.NDArray[np.bool_]:
+    return np.asarray((rows["shape"] != POINT) & _shining(rows) & ~beamed_balls(rows))
+
+
+def _shining(rows: Rows) -> npt.NDArray[np.bool_]:
+    shape = rows["shape"]
     lit = (rows["intensity"] > 0.0).any(axis=1)
     sized = (rows["radius"] > 0.0) | (shape == RECT) | (shape == DISK)
-    return np.asarray((flat | ((shape == SPHERE) & ~beam)) & lit & sized & (rows["w"] > 0.0))
+    return np.asarray(lit & sized & (rows["w"] > 0.0))
 
 
 def _luminance(rows: Rows, profiles: tuple[Profile, ...]) -> Doubles:
     """cd/m2 per channel, (n, 3): candela over the area seen from the axis."""
-    shape, radius = rows["shape"], rows["radius"]
-    face = np.linalg.norm(np.cross(rows["x"], rows["y"]), axis=1)
-    side = 4.0 * np.linalg.norm(rows["x"], axis=1) * radius
-    area = np.select(
-        [shape == RECT, shape == DISK, shape == CYLINDER],
-        [4.0 * face, np.pi * face, side],
-        np.pi * radius**2,
-    )
     candela = np.array([_on_axis(profiles, int(number)) for number in rows["profile"]])
-    exact = np.asarray(rows["intensity"] * (candela / area)[:, None], np.float32)
+    exact = np.asarray(rows["intensity"] * (candela / seen_area(rows))[:, None], np.float32)
     # Copies of one lamp differ by roundings; to 2^-20 they have one material.
     bits = (exact.view(np.uint32) + np.uint32(8)) & ~np.uint32(15)
     return np.asarray(bits.view(np.float32), np.float64)

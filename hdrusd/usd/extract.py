@@ -17,20 +17,21 @@ from pxr import Usd, UsdGeom, UsdLux
 
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.report import Kind, Report
-from hdrusd.scene import LIGHT, RECT, Camera, RenderScene, light_rows
-from hdrusd.units import dome_luminance
+from hdrusd.scene import RECT, Camera, RenderScene, light_rows
+from hdrusd.units import TEXTURE_GAMMA, dome_luminance
 from hdrusd.usd.ambient import has_ambient, read_ambient
 from hdrusd.usd.bindings import Bindings
 from hdrusd.usd.camera import Conform, framing_camera, read_camera
-from hdrusd.usd.emitters import Emitters
+from hdrusd.usd.emitters import Emitters, beamed_balls
 from hdrusd.usd.facing import facing
 from hdrusd.usd.gprims import GprimReader
 from hdrusd.usd.instanced_lights import instanced_rows, joined, moved_row
 from hdrusd.usd.instancer import Copies, Instancers
 from hdrusd.usd.light import light_time_varying, read_light_row
+from hdrusd.usd.light_bounds import sound
 from hdrusd.usd.light_texture import LightTextures
 from hdrusd.usd.linking import Links
-from hdrusd.usd.lux import is_light
+from hdrusd.usd.lux import is_light, light_kind
 from hdrusd.usd.mesh_light import MeshLight, is_mesh_light
 from hdrusd.usd.profile import Profiles
 from hdrusd.usd.varying import hides, place_varies, visible
@@ -64,7 +65,7 @@ class StageReader:
 
     ``purposes`` beside "default" that are drawn; ``default_sky``: whether a stage
     without light is shown under ``DEFAULT_SKY``; ``level``: refinements of subdivision
-    cages and curves.
+    cages and curves; ``gamma``: of 8-bit pictures on lights.
     """
 
     def __init__(
@@ -75,6 +76,7 @@ class StageReader:
         purposes: Iterable[str] = ("render",),
         default_sky: bool = True,
         level: int = 0,
+        gamma: float = TEXTURE_GAMMA,
     ) -> None:
         self.stage = stage
         self.report = report
@@ -85,7 +87,7 @@ class StageReader:
         self.instancers = Instancers(stage, self.purposes, report)
         self.profiles = Profiles(stage, report)
         self.links = Links(stage, report)
-        self.textures = LightTextures(stage, report)
+        self.textures = LightTextures(stage, report, gamma=gamma)
         self.emitters = Emitters()
         self.gprims = GprimReader(
             self.bindings,
@@ -220,7 +222,7 @@ class StageReader:
     def _plan_light(self, plan: _Plan, prim: Usd.Prim) -> None:
         if prim.IsA(UsdLux.DomeLight) or prim.IsA(UsdLux.DomeLight_1):
             plan.domes.append(prim)
-        elif prim.IsA(UsdLux.NonboundableLightBase) or prim.IsA(UsdLux.BoundableLightBase):
+        elif light_kind(prim) != "other":
             plan.lights.append(
                 Light(prim, light_time_varying(prim), place_varies(prim), hides(prim))
             )
@@ -244,8 +246,8 @@ class StageReader:
         for mesh in plan.meshes:
             if visible(mesh.prim, code):
                 rows = mesh.rows(cache)
-                if not _sound(rows).all() or not len(rows):
-                    text = "not finite, negative or without area; left out"
+                if not sound(rows).all() or not len(rows):
+                    text = "not finite, negative, too large or without area; left out"
                     self._finding(Kind.INVALID, "light-invalid", text, mesh.prim)
                     continue
                 self.links.assign(mesh.prim, rows)
@@ -256,6 +258,9 @@ class StageReader:
         self, prim: Usd.Prim, rows: npt.NDArray[np.void], code: Usd.TimeCode, *, moving: bool
     ) -> npt.NDArray[np.void]:
         """Rows as they shine, in tiles where a picture lies on them; notes what is seen."""
+        if beamed_balls(rows).any():
+            text = "a ball with a cone, focus or photometric file shines and is not seen"
+            self._finding(Kind.DROPPED, "light-not-seen", text, prim)
         picture = self.textures.of(prim, code) if (rows["shape"] == RECT).all() else None
         if picture is None:
             self.emitters.show(rows, moving=moving)
@@ -277,10 +282,9 @@ class StageReader:
             if row is not None:
                 self.profiles.assign(light.prim, row, cache.GetTime())
                 self.links.assign(light.prim, row)
-            if row is None or not _sound(row).all():
-                self._finding(
-                    Kind.INVALID, "light-invalid", "not finite or negative; left out", light.prim
-                )
+            if row is None or not sound(row).all():
+                text = "not finite, negative or too large; left out"
+                self._finding(Kind.INVALID, "light-invalid", text, light.prim)
                 return None
             light.row, light.place = row, matrix
         return light.row
@@ -294,11 +298,11 @@ class StageReader:
                 rows = instanced_rows(copies, code, self.unit, self.report)
                 self.profiles.assign(copies.source, rows, code)
                 self.links.assign(copies.source, rows)
-                sound = _sound(rows)
-                if not sound.all() or not len(rows):
-                    text = "not finite, negative or no lamp; left out"
+                good = sound(rows)
+                if not good.all() or not len(rows):
+                    text = "not finite, negative, too large or no lamp; left out"
                     self._finding(Kind.INVALID, "light-invalid", text, copies.source)
-                known = self._lamps[copies] = rows[sound]
+                known = self._lamps[copies] = rows[good]
             varies = copies.varies or light_time_varying(copies.source)
             yield self._shown(copies.source, known, code, moving=varies)
 
@@ -320,12 +324,6 @@ def _default_light(camera: Camera) -> npt.NDArray[np.void]:
 def _sky_luminance(ambient: tuple[float, float, float]) -> tuple[float, float, float]:
     r, g, b = (dome_luminance(lux) for lux in ambient)
     return r, g, b
-
-
-def _sound(rows: npt.NDArray[np.void]) -> npt.NDArray[np.bool_]:
-    """(n,) whether a light's numbers are numbers, and give light rather than take it."""
-    finite = [np.isfinite(rows[name]).reshape(len(rows), -1) for name in LIGHT.names or ()]
-    return np.asarray(np.concatenate([rows["intensity"] >= 0.0, *finite], axis=1).all(axis=1))
 
 
 def _meters_per_unit(stage: Usd.Stage, report: Report) -> float:

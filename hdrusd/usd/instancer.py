@@ -18,6 +18,9 @@ from hdrusd.usd.varying import hides, place_varies, visible
 #: Copies of one thing by one instancer, those of nested ones multiplied: 512 MiB of matrices.
 MOST_COPIES = 1 << 22
 
+#: Prims that are visited for one instancer with all inside it: they too multiply.
+MOST_VISITED = 10_000
+
 #: Instancers inside one another; each may multiply the copies.
 _DEEPEST = 8
 
@@ -90,6 +93,9 @@ class Instancers:
         walk = _Walk(cache, self.purposes, self.report, self._place)
         first = Copies(prim, outer, np.zeros(1, np.int64), varies)
         content = list(walk.inside(first, (prim.GetPath(),)))
+        if walk.stopped:
+            text = f"more than {MOST_VISITED} prims in prototypes; the rest is not shown"
+            self.report.add(Kind.DROPPED, "instancer-limit", self._place, str(prim.GetPath()), text)
         return content, varies or walk.varies
 
 
@@ -105,6 +111,12 @@ class _Walk:
         self.report = report
         self.place = place
         self.varies = False
+        self._visited = 0
+
+    @property
+    def stopped(self) -> bool:
+        """Whether there was too much to see all of it."""
+        return self._visited > MOST_VISITED
 
     def inside(self, at: Copies, chain: tuple[Sdf.Path, ...]) -> Iterator[Copies]:
         """What the instancer ``at.source`` shows, for each of its own places ``at.transforms``."""
@@ -127,6 +139,8 @@ class _Walk:
         stage = at.source.GetStage()
         for number, target in enumerate(instancer.GetPrototypesRel().GetForwardedTargets()):
             chosen = (indices == number) & shown
+            if self.stopped:
+                return
             root = stage.GetPrimAtPath(target)
             if not root:
                 text = f"prototype {target} is not there"
@@ -150,6 +164,9 @@ class _Walk:
         predicate = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)
         walk = iter(Usd.PrimRange(root, predicate))
         for source in walk:
+            self._visited += 1
+            if self.stopped:
+                return
             nested = source.IsA(UsdGeom.PointInstancer)
             if nested:
                 walk.PruneChildren()

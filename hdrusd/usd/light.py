@@ -22,7 +22,7 @@ from hdrusd.scene import light_rows
 from hdrusd.units import LUMINANCE_WEIGHTS, distant_luminance, dome_luminance, sphere_luminance
 from hdrusd.usd.area import shape_row
 from hdrusd.usd.light_controls import light_key, read_controls
-from hdrusd.usd.lux import LuxReading, input_number, photometric_file, read_lux
+from hdrusd.usd.lux import LuxReading, connection_end, input_number, photometric_file, read_lux
 
 #: Full angle of a distant light that we write: the sun's and the moon's, degrees.
 DISTANT_ANGLE = 0.53
@@ -122,8 +122,11 @@ def read_light(prim: Usd.Prim, *, scale: float = 1.0) -> PhotometricLight:
 
 
 def light_time_varying(prim: Usd.Prim) -> bool:
-    """Whether any input of the light may change between frames."""
-    return any(a.ValueMightBeTimeVarying() for a in prim.GetAttributes() if a.HasAuthoredValue())
+    """Whether any input of the light, or what it is connected to, may change between frames."""
+    return any(
+        attribute.ValueMightBeTimeVarying() or connection_end(attribute).ValueMightBeTimeVarying()
+        for attribute in prim.GetAuthoredAttributes()
+    )
 
 
 def read_light_row(

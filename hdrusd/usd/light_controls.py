@@ -29,6 +29,12 @@ def light_key(prim: Usd.Prim) -> int:
     return int.from_bytes(digest, "little", signed=True)
 
 
+def casts_shadows(prim: Usd.Prim, time: Usd.TimeCode) -> bool:
+    """``inputs:shadow:enable`` of a light with ShadowAPI; true without it."""
+    source = input_source(prim, "shadow:enable") if prim.HasAPI(UsdLux.ShadowAPI) else None
+    return not (source and source.Get(time) is False)
+
+
 def read_controls(
     prim: Usd.Prim, time: Usd.TimeCode, rows: npt.NDArray[np.void], report: Report
 ) -> None:
@@ -45,8 +51,7 @@ def read_controls(
             finding(Kind.CLAMPED, "light-multiplier", text)
         rows[name] = np.maximum(factor, 0.0)  # NaN stays, and the light is left out
     if prim.HasAPI(UsdLux.ShadowAPI):
-        source = input_source(prim, "shadow:enable")
-        rows["shadow"] = 0 if source and source.Get(time) is False else 1
+        rows["shadow"] = casts_shadows(prim, time)
         for name, neutral in _SHADOW_INPUTS.items():
             source = input_source(prim, name)
             value: Any = source.Get(time) if source else None

@@ -5,7 +5,7 @@ exact for what such tiles can tell apart, that is beyond about a quarter of the 
 nearer, a texel's light comes from all of its tile. Cone and focus are taken from the centre
 of each tile. The picture stands upright as seen from the lit side: its first pixel, at the top
 left, is at +X +Y of the light (schema text: "min coordinates should be at (+X, +Y)"). An 8-bit
-picture is T^2.2, as everywhere; float files are taken as they are.
+picture is T^gamma, as everywhere; float files are taken as they are.
 """
 
 from __future__ import annotations
@@ -57,8 +57,9 @@ class Picture:
 class LightTextures:
     """The pictures of lights of one stage, each file read once."""
 
-    def __init__(self, stage: Usd.Stage, report: Report) -> None:
+    def __init__(self, stage: Usd.Stage, report: Report, *, gamma: float = TEXTURE_GAMMA) -> None:
         self.report = report
+        self.gamma = gamma
         self._place = SourceRef(Path(stage.GetRootLayer().identifier))
         self._known: dict[str, Picture | None] = {}
 
@@ -74,7 +75,7 @@ class LightTextures:
                 data = asset_bytes(path)
                 if data is None:
                     raise InputError(Path(path), "no such image")
-                self._known[path] = picture(path, read_image(Path(path), data))
+                self._known[path] = picture(path, read_image(Path(path), data), self.gamma)
             except (InputError, OSError) as problem:
                 self._known[path] = None
                 text = f"{problem}; the light is evenly bright"
@@ -83,12 +84,12 @@ class LightTextures:
         return self._known[path]
 
 
-def picture(path: str, image: ImageData) -> Picture:
-    """The tiles of a decoded image."""
+def picture(path: str, image: ImageData, gamma: float = TEXTURE_GAMMA) -> Picture:
+    """The tiles of a decoded image; 8-bit colours are T^gamma."""
     pixels = image.pixels
     texels = pixels.astype(np.float64)
     if pixels.dtype == np.uint8:
-        texels = (texels / 255.0) ** (TEXTURE_GAMMA if pixels.shape[2] >= 3 else 1.0)
+        texels = (texels / 255.0) ** (gamma if pixels.shape[2] >= 3 else 1.0)
     texels = np.repeat(texels[..., :1], 3, axis=2) if pixels.shape[2] < 3 else texels[..., :3]
     texels = np.maximum(np.nan_to_num(texels, posinf=0.0, neginf=0.0), 0.0)
     edges = [np.arange(min(n, TILES) + 1) * n // min(n, TILES) for n in texels.shape[:2]]

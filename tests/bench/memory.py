@@ -230,7 +230,10 @@ def held() -> tuple[int, ...]:
 
 def forgotten(ctx: moderngl.Context) -> int:
     """How many objects were collected without having been released."""
-    return sum(not isinstance(thing, moderngl.InvalidObject) for thing in ctx.objects)
+    lost = [thing for thing in ctx.objects if not isinstance(thing, moderngl.InvalidObject)]
+    ctx.objects.clear()  # what was released left an empty object here
+    ctx.objects.extend(lost)
+    return len(lost)
 
 
 def watch(frames: int, size: tuple[int, int]) -> Iterator[tuple[int, float, tuple[int, ...], int]]:

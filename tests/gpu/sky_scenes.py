@@ -78,7 +78,10 @@ def _rows_up(layer: Array) -> bytes:
 def surfaces(
     normal: Array, depth: Array, *, f0: Array | float = 0.04, metallic: float = 0.0, **more: Any
 ) -> Mapping[str, Array]:
-    """Layers of a G-buffer: ``rho`` reflectance, ``alpha`` of GGX (or ``shininess``), ``coat``."""
+    """Layers of a G-buffer: ``rho`` reflectance, ``alpha`` of GGX (or ``shininess``), ``coat``.
+
+    ``scattered``: what sky light becomes.
+    """
     shape = normal.shape[:2]
     gloss = np.broadcast_to(more.get("shininess", -np.asarray(more.get("alpha", 0.25))), shape)
     rho = np.broadcast_to(more.get("rho", 0.5), (*shape, 3))
@@ -89,6 +92,10 @@ def surfaces(
             [np.broadcast_to(f0, (*shape, 3)), np.full((*shape, 1), metallic)], axis=-1
         ),
     }
+    if "scattered" in more:
+        layers["g_scattered"] = np.concatenate(
+            [np.broadcast_to(more["scattered"], (*shape, 3)), np.zeros((*shape, 1))], axis=-1
+        )
     if "coat" in more:
         extra = np.zeros((*shape, 4))
         extra[..., :2] = more["coat"]

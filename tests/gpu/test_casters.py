@@ -53,7 +53,46 @@ def test_what_casts(gl: Any, moving: bool) -> None:
     assert below(draw(ROOF)) == 0.0
     assert below(draw(ROOF, casts=False)) == 1.0
     assert below(draw(ROOF, 1)) == 1.0  # blends
-    assert below(draw(ROOF, 2)) == 1.0  # emits
+    assert below(draw(ROOF, 2)) == 0.0  # emits, and is no lamp's
+
+
+GLASS = slab((-0.2, -0.2, -0.1), (0.2, 0.2, 0.0), "glass")
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_a_lamp_s_glass_lets_its_light_through(gl: Any, moving: bool) -> None:
+    """What emits casts, but for what is small and near a lamp: each copy for itself."""
+
+    def below(*places: Any, lamp: Any = LAMP, geometry: Any = GLASS) -> list[float]:
+        shown = scene(lamp, FLOOR, draw(geometry, 2, *places, moving=moving))
+        return seen(gl, shown, [(0.0, 0.1, 0.0), (2.5, 0.1, 0.0)]).tolist()
+
+    # A street's lamp: its glass is 0.2 m below. One copy more, half way to the second point.
+    assert below(move(0, 0, 3.8)) == [1.0, 1.0]
+    assert below(move(0, 0, 3.8), move(1.25, 0, 2.0)) == [1.0, 0.0]
+    assert below(move(0, 0, 3.65)) == [0.0, 1.0]  # 0.35 m
+    assert below(move(0, 0, 3.65), lamp=LAMP | {"radius": 0.12}) == [1.0, 1.0]  # three radii
+    # A facade with lit windows, 4 m wide, beside the lamp.
+    wall = slab((-2.0, -0.2, -0.1), (2.0, 0.2, 0.0), "wall")
+    assert below(move(0, 0, 3.8), geometry=wall)[0] == 0.0
+
+
+@pytest.mark.parametrize("moving", [False, True])
+@pytest.mark.parametrize("lamp", [LAMP, SUN])
+def test_what_is_far_off_leaves_the_shadows_alone(
+    gl: Any, moving: bool, lamp: dict[str, Any]
+) -> None:
+    report = Report()
+    shadows = maps(gl, report=report)
+    far = draw(plane(50.0, 0.0, "far"), 0, move(1e7, 0, 0), moving=moving)
+    shown = scene(lamp, FLOOR, draw(plane(0.5, 0.02, "low")), far)
+    places = along((0.0, -3.0, 0.0), (0.0, 3.0, 0.0), 301)
+    share = seen(gl, shown, places, shadows=shadows)
+    assert report.codes() == {"shadow-far"}
+    assert np.array_equal(share, seen(gl, replace(shown, draws=shown.draws[:2]), places))
+    assert 0.0 < share.mean() < 1.0
+    shadows.update(replace(shown, draws=shown.draws[1:]))
+    assert len(report) == 1
 
 
 @pytest.mark.parametrize("moving", [False, True])
@@ -180,7 +219,10 @@ def test_lights_that_do_not_fit_shine_without_shadows(gl: Any) -> None:
     kinds = shadows.update(shown).kind
     assert np.flatnonzero(kinds != "").tolist() == list(range(48))
     assert shadows.left_out.tolist() == list(range(48, 60))
-    assert report.codes() == {"shadow-budget"}
+    (finding,) = report
+    assert finding.code == "shadow-budget"
+    assert "12 of 60 lights" in finding.text
+    assert "at (-0.04, 0, 4) m with 800 cd, (-0.02, 0, 4) m with 800 cd, (0, 0, 4)" in finding.text
     shadows.update(shown)
     assert len(report) == 1
     # Seen from a little farther on those that have shadows keep them.

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from shadow_scenes import draw, plane, slab
 from sky_scenes import GBuffer, sky, sky_pass, surfaces
-from small_scenes import look, quad
+from small_scenes import look, quad, render
 
+from hdrusd.errors import SourceRef
+from hdrusd.gpu.casters import Casters
+from hdrusd.gpu.hdr import HdrRenderer, Options
 from hdrusd.gpu.program import Programs
 from hdrusd.gpu.sky_occlusion import SkyOcclusion, Views, even_directions
 from hdrusd.gpu.textures import TextureCache
-from hdrusd.photometry.environment import mean_schlick
 from hdrusd.report import Report
 from hdrusd.scene import Camera, Draw, Material, RenderScene
 
@@ -29,8 +33,10 @@ def lit(
     buffer = GBuffer(gl, **layers)
     programs, textures = Programs(gl), TextureCache(gl, lambda _: None, 2.2)
     report = Report() if report is None else report
+    casters = Casters(gl, programs, textures)
+    casters.update(scene)
     occlusion = SkyOcclusion(
-        gl, programs, textures, sky_pass(gl, **sky), buffer.size, 1 / PI, samples, report
+        gl, programs, casters, sky_pass(gl, **sky), buffer.size, 1 / PI, samples, report
     )
     occlusion.add(scene, buffer.layers, buffer.frame)
     return buffer.read()[..., :3]
@@ -69,7 +75,7 @@ def test_directions_share_the_sphere() -> None:
 def test_nothing_in_the_way_is_open_sky(gl: Any) -> None:
     view, normal, depth = from_above(2.0)
     normal[:, :16] = [0.6, 0.0, 0.8]  # shading normals need not be the plane's
-    got = lit(gl, ground(camera=view), surfaces(normal, depth, f0=0.0, rho=0.5), 256)
+    got = lit(gl, ground(camera=view), surfaces(normal, depth, f0=0.0, scattered=0.5), 256)
     # The ground itself hides what is below it; a surface that lies in it sees the upper half.
     assert got[:, 16:] == pytest.approx(np.full((24, 16, 3), 0.5), rel=1e-5)
     assert got[:, :16] == pytest.approx(np.full((24, 16, 3), 0.5 * 0.9), rel=2e-2)
@@ -80,7 +86,7 @@ def test_a_wall_takes_its_share_of_an_even_sky(gl: Any) -> None:
     view, normal, depth = from_above(1.0, 5.0)
     wall = quad((1.4, -400.0, 0.0), (0.0, 800.0, 0.0), (0.0, 0.0, 2.0), key="wall")
     scene = ground(draw(wall), camera=view)
-    got = lit(gl, scene, surfaces(normal, depth, f0=0.0, rho=1.0), 4096)[..., 0]
+    got = lit(gl, scene, surfaces(normal, depth, f0=0.0, scattered=1.0), 4096)[..., 0]
     x, _ = places(view)
     wanted = (1.0 + np.cos(np.arctan2(2.0, 1.4 - x))) / 2.0
     assert got == pytest.approx(wanted, rel=0.01)
@@ -114,7 +120,7 @@ def roof(opening: Any, height: float, half: float = 400.0) -> list[Draw]:
 def test_an_opening_in_a_roof(gl: Any) -> None:
     view, normal, depth = from_above(1.0, 2.0)
     scene = ground(*roof(((-0.8, -0.7), (1.2, 1.1)), 3.0), camera=view)
-    got = lit(gl, scene, surfaces(normal, depth, f0=0.0, rho=1.0), 8192)[..., 0]
+    got = lit(gl, scene, surfaces(normal, depth, f0=0.0, scattered=1.0), 8192)[..., 0]
     x, y = places(view)
     corners = [(-0.8, -0.7), (1.2, -0.7), (1.2, 1.1), (-0.8, 1.1)]
     wanted = parallel_opening(x, y, corners, 3.0)
@@ -133,7 +139,7 @@ def test_the_sky_s_colours_come_from_their_own_sides(gl: Any) -> None:
     view, normal, depth = from_above(0.2, 5.0)
     wall = quad((0.3, -400.0, 0.0), (0.0, 800.0, 0.0), (0.0, 0.0, 100.0), key="wall")
     scene = ground(draw(wall), camera=view, ambient=(0.0, 0.0, 0.0), skies=(dome,))
-    got = lit(gl, scene, surfaces(normal, depth, f0=0.0, rho=1.0), 2048, sky=texels)
+    got = lit(gl, scene, surfaces(normal, depth, f0=0.0, scattered=1.0), 2048, sky=texels)
     assert got[..., 0].max() < 0.01
     assert got[..., 2] == pytest.approx(np.full((24, 32), 0.5), rel=0.02)
 
@@ -141,24 +147,56 @@ def test_the_sky_s_colours_come_from_their_own_sides(gl: Any) -> None:
 def test_casters_that_do_not_cast_let_the_sky_through(gl: Any) -> None:
     view, normal, depth = from_above(1.0, 5.0)
     lid = slab((-30, -30, 2), (30, 30, 2.1))
-    layers = surfaces(normal, depth, f0=0.0, rho=1.0)
+    layers = surfaces(normal, depth, f0=0.0, scattered=1.0)
     dark = lit(gl, ground(draw(lid), camera=view), layers, 512)
     assert dark.max() < 0.02
     scene = ground(draw(lid, casts=False), camera=view)
     assert lit(gl, scene, layers, 512) == pytest.approx(np.ones((24, 32, 3)), rel=1e-5)
 
 
-def test_a_reflecting_surface_scatters_what_is_left(gl: Any) -> None:
-    view, normal, depth = from_above(1.0, 5.0)
-    scene = ground(camera=view)
-    layers = surfaces(normal, depth, f0=0.1, rho=1.0, coat=(0.5, 0.1))
-    bent = float(mean_schlick(np.asarray(1.0)))
-    coat = 0.5 * (0.04 + 0.96 * bent)
-    wanted = (1.0 - 0.1 - 0.9 * bent) * (1.0 - coat)
-    got = lit(gl, scene, layers, 64)
-    assert got == pytest.approx(np.full((24, 32, 3), wanted), rel=1e-5)
-    dull = surfaces(normal, depth, f0=0.1, rho=1.0, shininess=10.0)
-    assert lit(gl, scene, dull, 64) == pytest.approx(np.ones((24, 32, 3)), rel=1e-5)
+METAL = Material(diffuse=(0.5, 0.4, 0.3), metallic=1.0)
+GLOSSY = Material(model="ggx", diffuse=(0.5,) * 3, specular=(0.1,) * 3, roughness=0.5)
+
+
+@pytest.mark.parametrize(
+    "material",
+    [
+        Material(diffuse=(0.5,) * 3, occlusion=0.2),
+        METAL,
+        replace(METAL, metallic=0.5),
+        GLOSSY,
+        replace(GLOSSY, metallic=0.6, occlusion=0.5, clearcoat=0.7, emission=(1.0, 2.0, 3.0)),
+    ],
+)
+@pytest.mark.parametrize("shadows", [False, True])
+def test_open_sky_is_the_same_with_and_without_samples(
+    gl: Any, material: Material, shadows: bool
+) -> None:
+    view, _, _ = from_above(1.0, 5.0)
+    scene = ground(camera=view, materials=(material,), ambient=(100.0, 90.0, 80.0))
+    plain, sampled = (
+        render(gl, scene, size=SIZE, shadows=shadows, sky_samples=n).frame for n in (0, 128)
+    )
+    assert sampled == pytest.approx(plain, rel=1e-5)
+    if material.occlusion == 0.2:
+        assert sampled[..., 0] == pytest.approx(np.full((24, 32), 0.5 * 0.2 * 100.0 / PI), rel=1e-5)
+
+
+def test_a_texel_s_size_is_said_once(gl: Any) -> None:
+    report, place = Report(), SourceRef(Path("street.usda"))
+    renderer = HdrRenderer(
+        gl,
+        Programs(gl),
+        SIZE,
+        lambda _: None,
+        Options(sky_samples=64, samples=4),
+        report,
+        place,
+    )
+    for height in (5.0, 6.0):
+        renderer.render(ground(camera=from_above(height, height)[0]))
+    (finding,) = report
+    assert (finding.code, finding.source) == ("sky-occlusion", place)
 
 
 def test_where_nothing_is_seen_nothing_is_done(gl: Any) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -276,6 +277,7 @@ def test_a_sun_becomes_a_light_in_the_world_and_a_finding(gl: Any) -> None:
     assert sun["intensity"] == pytest.approx(np.array([0.5e6, 1e6, 1.5e6]) * omega, rel=1e-5)
     assert sun["angle"] < PI / 128
     assert report.codes() == {"sky-sun"}
+    assert not skies.with_suns(scene(skies=(replace(dome, shadow=False),))).lights["shadow"].any()
     # The rest is even: pi L.
     lux = ambient_lux(np.array([0.0, 1.0, 0.0]), skies.lux_coefficients(lit))
     assert lux == pytest.approx(np.full(3, 0.5 * PI), rel=1e-3)

@@ -96,6 +96,35 @@ def test_a_channel_more_is_another_texture(gl: Any) -> None:
     np.testing.assert_allclose(value, CODES[3, 0, 0] / 255.0, rtol=2**-11)
 
 
+def test_what_no_material_names_is_released(gl: Any) -> None:
+    """An animated file: of ten pictures two lists' are kept beside the present one's."""
+    made = cache(gl, ImageData(CODES))
+    refs = [TextureRef(f"{i}.png", "linear") for i in range(10)]
+    for ref in refs:
+        made.prepare((rough(0, ref),))
+    assert list(made._kept) == refs[-3:]
+    assert len(made._seen) == 3
+    textures = [made.get(ref).texture for ref in refs[-3:]]  # type: ignore[union-attr]
+    last = rough(0, refs[-1])
+    for _ in range(4):
+        made.prepare((last,))
+    assert [isinstance(t.mglo, moderngl.mgl.InvalidObject) for t in textures] == [True, True, False]
+
+
+def test_what_is_replaced_is_released_when_nobody_reads_it(gl: Any) -> None:
+    made = cache(gl, ImageData(CODES))
+    first, second = rough(0), rough(1)
+    assert made.prepare((first,)) == frozenset()
+    narrow = made.get(REF)
+    assert narrow is not None
+    assert made.prepare((first, second)) == {REF}
+    assert narrow.texture.size == (6, 4)
+    narrow.texture.use(0)  # still there
+    for _ in range(3):
+        assert made.prepare((first, second)) == frozenset()
+    assert isinstance(narrow.texture.mglo, moderngl.mgl.InvalidObject)
+
+
 def test_many_textures_are_decoded_in_threads_and_kept_apart(gl: Any) -> None:
     names: set[str] = set()
 

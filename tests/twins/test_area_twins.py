@@ -191,3 +191,10 @@ def test_nothing_is_infinite(gl: Any, name: str) -> None:
         given = (x, np.full(6, 0.5))
     assert np.isfinite(glsl(gl, name, p, n, *given)).all()
     assert np.isfinite(getattr(area, name)(p, n, *given)).all()
+
+
+def test_a_circle_beyond_the_fourth_root_of_float32(gl: Any) -> None:
+    p = f32([[6e9, 0.0, 8e9], [0.0, 0.0, 1e10]])
+    n = np.array([[0.0, 0.0, 1.0]] * 2)
+    got = glsl(gl, "circle_illuminance", p, n, -n, np.ones(2))
+    assert got == pytest.approx([0.64e-20, 1e-20], rel=20 * R)

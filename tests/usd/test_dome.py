@@ -198,3 +198,10 @@ def test_pictures_and_intensities_may_change_in_time() -> None:
 def test_the_sky_is_seen_where_that_is_asked_for() -> None:
     assert not sky(dome()).visible
     assert sky(dome(), sky_visible=True).visible
+
+
+def test_shadows_of_a_dome_may_be_switched_off() -> None:
+    light = dome()
+    assert sky(light).shadow
+    UsdLux.ShadowAPI.Apply(light.GetPrim()).CreateShadowEnableAttr(False)
+    assert not sky(light).shadow

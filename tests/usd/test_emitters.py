@@ -13,7 +13,7 @@ from pxr import Gf, Sdf, UsdGeom, UsdLux
 
 from hdrusd.photometry.light import PhotometricLight
 from hdrusd.report import Report
-from hdrusd.scene import CYLINDER, DISK, POINT, RECT, SPHERE, Draw, Profile, RenderScene
+from hdrusd.scene import CYLINDER, DISK, POINT, RECT, SPHERE, Camera, Draw, Profile, RenderScene
 from hdrusd.usd.emitters import Emitters
 from hdrusd.usd.extract import StageReader
 from hdrusd.usd.light import write_light
@@ -179,3 +179,37 @@ def test_a_lamp_that_changes_is_moving() -> None:
     lamp.GetIntensityAttr().Set(3.0, 2.0)
     (draw,) = scene_of(stage).draws
     assert draw.moving
+
+
+def test_a_static_stage_keeps_its_draws_and_materials() -> None:
+    stage = new_stage()
+    for number in range(3):
+        light = UsdLux.RectLight.Define(stage, f"/Panel{number}")
+        light.CreateIntensityAttr(1.0 + number)
+    mesh = UsdGeom.Mesh.Define(stage, "/Glow")
+    mesh.CreatePointsAttr([Gf.Vec3f(*p) for p in ((0, 0, 0), (1, 0, 0), (0, 1, 0))])
+    mesh.CreateFaceVertexCountsAttr([3])
+    mesh.CreateFaceVertexIndicesAttr([0, 1, 2])
+    UsdLux.MeshLightAPI.Apply(mesh.GetPrim())
+    reader = StageReader(stage, Report())
+    first, *others = [reader.read(float(time), Camera()) for time in range(4)]
+    assert len(first.draws) == 4
+    for scene in others:
+        assert list(map(id, scene.draws)) == list(map(id, first.draws))
+        assert list(map(id, scene.materials)) == list(map(id, first.materials))
+
+
+def test_a_ball_with_a_beam_is_a_finding_unless_it_is_called_a_point() -> None:
+    stage, report = new_stage(), Report()
+    UsdGeom.Cube.Define(stage, "/Box")
+    lamp = UsdLux.SphereLight.Define(stage, "/Lamp")
+    lamp.CreateIntensityAttr(5.0)
+    UsdLux.ShapingAPI.Apply(lamp.GetPrim()).CreateShapingConeAngleAttr(40.0)
+    reader = StageReader(stage, report)
+    for time in range(2):
+        assert len(reader.read(float(time), Camera()).draws) == 1
+    assert [f.code for f in report if f.thing == "/Lamp"] == ["light-not-seen"]
+    lamp.CreateTreatAsPointAttr(True)
+    report = Report()
+    StageReader(stage, report).read(0.0, Camera())
+    assert "light-not-seen" not in report.codes()

@@ -263,3 +263,23 @@ def test_numbers_of_copies_are_spread_without_meeting() -> None:
     assert len(np.unique(mixed(ids))) == 100_000
     # SplitMix64 (Steele, Lea, Flood 2014) from state 0 begins with this.
     assert int(mixed(np.zeros(1, np.int64)).astype(np.uint64)[0]) == 0xE220A8397B1DCDAF
+
+
+def test_instancers_that_all_hold_all_of_the_next_level_are_cut_short(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "MOST_VISITED", 500)
+    stage, wide = new_stage(), 6
+    instancer(stage, "/I", [(0, 0, 0)] * wide, [f"/L0/N{i}" for i in range(wide)], range(wide))
+    for level in range(6):
+        stage.OverridePrim(f"/L{level}")
+        targets = [f"/L{level + 1}/N{i}" for i in range(wide)]
+        for i in range(wide):
+            instancer(stage, f"/L{level}/N{i}", [(0, 0, 0)] * wide, targets, range(wide))
+    for i in range(wide):
+        UsdGeom.Cube.Define(stage, f"/L6/N{i}")
+    report = Report()
+    scene = read(stage, report)
+    assert "/I" in {f.thing for f in report if f.code == "instancer-limit"}
+    tops = 1 + 6 * wide  # all of them are in the stage itself too
+    assert 0 < sum(len(d.transforms) for d in scene.draws) <= 500 * tops

@@ -276,3 +276,19 @@ def test_animated_intensity_is_read_at_its_time() -> None:
     candela.Set(300.0, 3.0)
     assert light_time_varying(prim)
     assert row(prim, time=2.0)["intensity"][0] == pytest.approx([200.0] * 3, rel=3 * ULP)
+
+
+def test_what_a_light_is_connected_to_may_vary() -> None:
+    stage = new_stage()
+    owner = stage.DefinePrim("/Rig")
+    dimmer = owner.CreateAttribute("inputs:dimmer", Sdf.ValueTypeNames.Float)
+    light = UsdLux.SphereLight.Define(stage, "/Lamp")
+    light.CreateIntensityAttr(1.0).AddConnection(dimmer.GetPath())
+    dimmer.Set(2.0)
+    assert not light_time_varying(light.GetPrim())
+    dimmer.Set(1.0, 0.0)
+    dimmer.Set(3.0, 1.0)
+    assert light_time_varying(light.GetPrim())
+    assert row(light.GetPrim(), time=1.0)["intensity"] == pytest.approx(
+        3.0 * row(light.GetPrim(), time=0.0)["intensity"]
+    )

@@ -39,6 +39,7 @@ def lamp(
     """A sphere light of ``multiplier`` cd without its file."""
     light = UsdLux.SphereLight.Define(stage, path)
     light.CreateRadiusAttr(0.5)
+    light.CreateTreatAsPointAttr(True)
     light.CreateIntensityAttr(multiplier / (math.pi * 0.25))
     shaping = UsdLux.ShapingAPI.Apply(light.GetPrim())
     shaping.CreateShapingConeAngleAttr(180.0)

@@ -12,7 +12,8 @@ from pxr import Sdf, Usd, UsdLux
 from hdrusd.images import write_exr
 from hdrusd.photometry.area import rect_illuminance
 from hdrusd.report import Report
-from hdrusd.scene import RECT, ImageData
+from hdrusd.scene import RECT, Camera, ImageData
+from hdrusd.usd.extract import StageReader
 from hdrusd.usd.light_texture import TILES, LightTextures, picture
 
 rng = np.random.default_rng(7)
@@ -114,3 +115,13 @@ def test_a_missing_or_broken_file_is_told(tmp_path: Path, content: bytes | None)
     assert textures.of(prim, Usd.TimeCode(0)) is None
     assert textures.of(prim, Usd.TimeCode(1)) is None
     assert [f.code for f in report] == ["light-texture"]
+
+
+def test_the_gamma_is_the_renderer_s(tmp_path: Path) -> None:
+    stage = new_stage()
+    light = UsdLux.RectLight.Define(stage, "/Panel")
+    png(tmp_path / "a.png", np.full((2, 2, 3), 128, np.uint8))
+    light.CreateTextureFileAttr(Sdf.AssetPath(str(tmp_path / "a.png")))
+    reader = StageReader(stage, Report(), gamma=1.0)
+    rows = reader.read(0.0, Camera()).lights
+    assert rows["intensity"].sum(axis=0) == pytest.approx([128 / 255] * 3)

@@ -71,6 +71,11 @@ layout(location = 3) out vec4 hdr;         // cd/m2; 1, or as composite.frag wan
 layout(location = 4) out vec4 g_extra;     // clear coat: weight, alpha; light links; 0
 #endif
 
+#ifdef SKY_APART
+// What the sky's lux becomes, reflectance times occlusion: sky_light.frag adds it.
+layout(location = SKY_APART) out vec4 g_scattered;
+#endif
+
 #ifdef PEEL
 uniform sampler2D opaque;      // g_normal of what is not blended
 uniform sampler2D before;      // g_normal of the layer in front of this one
@@ -112,12 +117,12 @@ void main()
     n = bumped(n, bump NORMAL_MAP, image_place(NORMAL_PLACE));
 #endif
     n *= gl_FrontFacing ? 1.0 : back_sign;
-#ifdef SKY
+#ifdef SKY_APART
+#elif defined(SKY)
     vec3 lux = ambient_lux(n, sky);
 #else
     vec3 lux = ambient;
 #endif
-    lux *= clamp(occlusion OCCLUSION_MAP, 0.0, 1.0);
     vec3 rho = base * (1.0 - metal);
     vec3 f0 = mix(specular SPECULAR_MAP, base, metal);
 #ifdef GGX
@@ -130,7 +135,13 @@ void main()
     // A metal of legacy materials mirrors the sky as a diffuse surface scatters it.
     vec3 scattered = base;
 #endif
-    vec3 glow = max(emission EMISSION_MAP, 0.0) + lambert(scattered, lux, lambert_scale);
+    scattered *= clamp(occlusion OCCLUSION_MAP, 0.0, 1.0);
+    vec3 glow = max(emission EMISSION_MAP, 0.0);
+#ifdef SKY_APART
+    g_scattered = vec4(scattered, 0.0);
+#else
+    glow += lambert(scattered, lux, lambert_scale);
+#endif
 #ifdef GGX
     float rough = clamp(roughness ROUGHNESS_MAP, 0.0, 1.0);
     float gloss = -max(rough * rough, 1e-3);

@@ -24,12 +24,27 @@ struct Surface {
     float links;     // bits
 };
 
+#if defined(RECT) || defined(DISK) || defined(SPHERE) || defined(CYLINDER) || defined(DISTANT)
+#define SIZED
+#endif
+// After a lobe of alpha^2: it is that of the light's representative point.
+#if defined(SIZED) && (defined(BLINN) || defined(GGX))
+#include "photometry/highlight.glsl"
+#define OF_SIZE(alpha2) * highlight_share(lobe_share(a.spread, 1.0, alpha2), a.nl, a.middle)
+#else
+#define OF_SIZE(alpha2)
+#endif
+
 // What of a light arrives there.
 struct Arrival {
     vec3 lux;        // on the surface, unobstructed or not, as far as diffuse reflection goes
     vec3 gloss_lux;  // the same for the highlight
     vec3 l;          // unit vector that the highlight takes for the light's direction
     float nl;
+#ifdef SIZED
+    vec2 spread;     // by how much the size of the light moves the half vector (highlight.glsl)
+    float middle;    // N.L of its centre
+#endif
 };
 
 // A light of three texels: position, 1/radius^2 | intensity, inner | axis, 1/width.
@@ -94,11 +109,11 @@ void reflect_light(Surface s, Arrival a)
 #else
     vec3 f = fresnel(ks, f90, weight);
 #endif
-    float lobe = ggx_lobe(gain, alpha2, a.nl, half_way.x);
+    float lobe = ggx_lobe(gain, alpha2, a.nl, half_way.x) OF_SIZE(alpha2);
 #ifdef BLINN
     bool blinn = s.gloss >= 0.0;
     float nh = half_cosine(a.nl, s.nv, dot(s.v, a.l));
-    lobe = blinn ? blinn_phong(nh, s.gloss, lambert_scale) : lobe;
+    lobe = blinn ? blinn_phong(nh, s.gloss, lambert_scale) OF_SIZE(blinn_alpha2(s.gloss)) : lobe;
     vec3 below = blinn ? vec3(1.0) : 1.0 - f;
     f = blinn ? ks : f;
 #elif defined(DIELECTRIC)
@@ -112,14 +127,16 @@ void reflect_light(Surface s, Arrival a)
 #ifdef COATED
     float c = coat_reflectance(coat, weight);
     below *= 1.0 - c;
-    shine = layered(shine, vec3(c), ggx_lobe(coat_gain, coat_alpha2, a.nl, half_way.x));
+    float coat_lobe = ggx_lobe(coat_gain, coat_alpha2, a.nl, half_way.x) OF_SIZE(coat_alpha2);
+    shine = layered(shine, vec3(c), coat_lobe);
 #endif
     sum += a.lux * below;
     gloss += a.gloss_lux * shine;
 #else
     sum += a.lux;
 #ifdef BLINN
-    gloss += a.gloss_lux * blinn_phong(half_cosine(a.nl, s.nv, dot(s.v, a.l)), s.gloss, lambert_scale);
+    float nh = half_cosine(a.nl, s.nv, dot(s.v, a.l));
+    gloss += a.gloss_lux * (blinn_phong(nh, s.gloss, lambert_scale) OF_SIZE(blinn_alpha2(s.gloss)));
 #endif
 #endif
 }

@@ -54,9 +54,35 @@ Arrival special_arrival(Surface s, int at)
 #elif defined(CYLINDER)
     float received = cylinder_illuminance(to, s.n, x.xyz, more.w);
 #elif defined(DISTANT)
-    float received = sphere_illuminance(a.l, s.n, more.w * inversesqrt(1.0 + more.w * more.w));
+    float sine = more.w * inversesqrt(1.0 + more.w * more.w);
+    float received = sphere_illuminance(a.l, s.n, sine);
 #else
     float received = illuminance(a.nl, inverse_d * inverse_d, candela.w);
+#endif
+#if defined(SIZED) && (defined(BLINN) || defined(GGX))
+    // For its highlight the light is the point of it that is nearest to the mirrored ray.
+    vec3 ray = 2.0 * s.nv * s.n - s.v;
+    a.middle = a.nl;
+#if defined(RECT)
+    a.spread = vec2(STRAIGHT, STRAIGHT * STRAIGHT) * spread(to, s.v, x.xyz, y.xyz);
+    to = rect_point(to, ray, axis.xyz, x.xyz, y.xyz);
+#elif defined(DISK)
+    a.spread = spread(to, s.v, x.xyz, y.xyz);
+    to = disk_point(to, ray, axis.xyz, x.xyz, y.xyz);
+#elif defined(SPHERE)
+    a.spread = sphere_spread(to, s.v, more.w);
+    to = sphere_point(to, ray, more.w);
+#elif defined(CYLINDER)
+    vec3 across = cross(x.xyz, to);
+    across *= more.w * inversesqrt(max(dot(across, across), 1e-20));
+    a.spread = vec2(STRAIGHT, STRAIGHT * STRAIGHT) * spread(to, s.v, x.xyz, across);
+    to = cylinder_point(to, ray, x.xyz, more.w);
+#else
+    a.spread = sphere_spread(a.l, s.v, sine);
+    to = sphere_point(a.l, ray, sine);
+#endif
+    a.l = to * inversesqrt(max(dot(to, to), 1e-20));
+    a.nl = dot(s.n, a.l);
 #endif
     a.lux = strength * (received * more.x);
     a.gloss_lux = strength * (received * more.y);
