@@ -21,6 +21,9 @@ MOST_COPIES = 1 << 22
 #: Prims that are visited for one instancer with all inside it: they too multiply.
 MOST_VISITED = 10_000
 
+#: And for all instancers of a stage at one time.
+MOST_VISITED_IN_ALL = 100_000
+
 #: Instancers inside one another; each may multiply the copies.
 _DEEPEST = 8
 
@@ -62,6 +65,7 @@ class Instancers:
         self._still: dict[Sdf.Path, list[Copies]] = {}
         self._moment: dict[Sdf.Path, list[Copies]] = {}
         self._time: Usd.TimeCode | None = None
+        self._left = MOST_VISITED_IN_ALL
 
     def __bool__(self) -> bool:
         """Whether there is any."""
@@ -76,6 +80,7 @@ class Instancers:
         if code != self._time:
             self._time, self._moment = code, {}
         found: list[Copies] = []
+        self._left = MOST_VISITED_IN_ALL
         for prim in self._prims:
             path = prim.GetPath()
             if path not in self._still and path not in self._moment:
@@ -90,11 +95,13 @@ class Instancers:
             return [], varies
         cache = UsdGeom.XformCache(code)
         outer = np.array(cache.GetLocalToWorldTransform(prim), np.float64)[None]
-        walk = _Walk(cache, self.purposes, self.report, self._place)
+        limit = min(MOST_VISITED, self._left)
+        walk = _Walk(cache, self.purposes, self.report, self._place, limit)
         first = Copies(prim, outer, np.zeros(1, np.int64), varies)
         content = list(walk.inside(first, (prim.GetPath(),)))
+        self._left -= walk.visited
         if walk.stopped:
-            text = f"more than {MOST_VISITED} prims in prototypes; the rest is not shown"
+            text = f"more than {limit} prims in prototypes; the rest is not shown"
             self.report.add(Kind.DROPPED, "instancer-limit", self._place, str(prim.GetPath()), text)
         return content, varies or walk.varies
 
@@ -103,20 +110,26 @@ class _Walk:
     """One instancer with all that is inside it, at one time."""
 
     def __init__(
-        self, cache: UsdGeom.XformCache, purposes: set[str], report: Report, place: SourceRef
+        self,
+        cache: UsdGeom.XformCache,
+        purposes: set[str],
+        report: Report,
+        place: SourceRef,
+        limit: int,
     ) -> None:
+        self.limit = limit
         self.cache = cache
         self.time = cache.GetTime()
         self.purposes = purposes
         self.report = report
         self.place = place
         self.varies = False
-        self._visited = 0
+        self.visited = 0
 
     @property
     def stopped(self) -> bool:
         """Whether there was too much to see all of it."""
-        return self._visited > MOST_VISITED
+        return self.visited > self.limit
 
     def inside(self, at: Copies, chain: tuple[Sdf.Path, ...]) -> Iterator[Copies]:
         """What the instancer ``at.source`` shows, for each of its own places ``at.transforms``."""
@@ -164,7 +177,7 @@ class _Walk:
         predicate = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)
         walk = iter(Usd.PrimRange(root, predicate))
         for source in walk:
-            self._visited += 1
+            self.visited += 1
             if self.stopped:
                 return
             nested = source.IsA(UsdGeom.PointInstancer)
