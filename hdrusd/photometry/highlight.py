@@ -14,7 +14,7 @@ u = (I - h h^T) x / (d |l + v|), and
 with k = 1 for an ellipse and 4/pi for straight sides, so that a mirror shows the light's own
 luminance. Error against integration of the GGX lobe, alpha from 0.01 to 1, lights of up to 1
 rad across, N.V from 1 to 0.4 (tests/facts/test_highlight.py): where the reflected ray meets
-the middle of the light 20 %, beside it at most half of that peak. Blinn's and Phong's lobe of
+the middle of the light 20 %, beside it at most 60 % of that peak. Blinn's and Phong's lobe of
 the exponent n counts as alpha^2 = 2 / (n + 2). A distant light of half angle a is a sphere of
 the radius sin(a) in the distance 1.
 

@@ -105,14 +105,14 @@ GLOSS = {
 @pytest.mark.parametrize("kind", LIGHTS)
 @pytest.mark.parametrize("gloss", GLOSS)
 def test_highlights_are_near_those_of_the_parts(kind: str, gloss: str) -> None:
-    """Within 20 % where the mirrored ray meets the middle, half of that peak beside it."""
+    """Within 20 % where the mirrored ray meets the middle, 60 % of that peak beside it."""
     light, parts = LIGHTS[kind]
     peak = luminance(parts, MIRROR, **GLOSS[gloss])
     assert luminance(light, MIRROR, **GLOSS[gloss]) == pytest.approx(peak, rel=0.2)
     for aside in (-1.2, -0.5, 0.3, 0.8):
         eye = MIRROR + aside * np.array([0.5, 0.6, 0.0])
         wanted = luminance(parts, eye, **GLOSS[gloss])
-        assert luminance(light, eye, **GLOSS[gloss]) == pytest.approx(wanted, abs=0.5 * peak)
+        assert luminance(light, eye, **GLOSS[gloss]) == pytest.approx(wanted, abs=0.6 * peak)
 
 
 def test_a_wide_distant_light_is_the_ball_that_it_looks_like() -> None:
