@@ -47,9 +47,9 @@ def _frame(file: Path) -> dict[str, Any]:
 
 
 def _stage(file: Path) -> dict[str, Any]:
-    from hdrusd.render import open_stage
     from hdrusd.report import Report
     from hdrusd.usd.extract import StageReader
+    from hdrusd.usd.opening import open_stage
     from hdrusd.usd.settings import read_settings
 
     report = Report()

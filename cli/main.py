@@ -22,6 +22,8 @@ COMMANDS = {
     "check": "Run the photometric validators on a stage.",
     "info": "Say what a database, a stage or a frame holds.",
     "operators": "List the tone mapping operators, or explain one.",
+    "observers": "List the observers whose eyes are known, or explain one.",
+    "screens": "List the screens, or explain one.",
     "schemas": "Print the folder of the USD schemas, for PXR_PLUGINPATH_NAME.",
     "doctor": "Say which device, versions and missing pieces there are.",
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -121,3 +121,19 @@ def finish(report: Report, strict: bool) -> None:
     """Exit with STRICT where findings are not wanted."""
     if strict and len(report):
         sys.exit(STRICT)
+
+
+def list_profiles(profiles: Mapping[str, Mapping[str, Any]]) -> None:
+    """Names and titles, a line each."""
+    width = max(map(len, profiles))
+    for name, keys in profiles.items():
+        click.echo(f"{name:<{width}}  {keys['title']}")
+
+
+def tell_keys(profile: object, keys: Mapping[str, tuple[str, str]]) -> None:
+    """What a profile has for each key, with the key's unit and meaning."""
+    for key, (unit, meaning) in keys.items():
+        value = getattr(profile, key)
+        shown = "none" if value is None else f"{value:g}" if isinstance(value, float) else value
+        suffix = f" {unit}" if unit and value is not None else ""
+        click.echo(f"{key}={shown}{suffix}: {meaning}")

@@ -12,6 +12,15 @@ import click
 
 from hdrusd.frames import check_pattern, parse_frames
 
+from .eye_options import (
+    beside,
+    chosen_cuts,
+    chosen_observer,
+    chosen_screen,
+    chosen_start,
+    eye_options,
+    plot_file,
+)
 from .options import (
     FILE,
     chosen_operator,
@@ -162,6 +171,7 @@ COMPLEXITIES |= {"1.0": 0, "1.1": 1, "1.2": 2, "1.3": 3}
 )
 @click.option("--half", is_flag=True, help="Half floats in the EXR; above 65504 they clip.")
 @click.option("--resume", is_flag=True, help="Skip frames whose files are there.")
+@eye_options
 @operator_options
 @report_options
 def command(stage: Path, output: str, **options: Any) -> None:
@@ -204,6 +214,7 @@ def command(stage: Path, output: str, **options: Any) -> None:
 def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
     """The options as a Job. Raises UsageError for what does not go together."""
     from hdrusd.render import Job
+    from hdrusd.tonemap.operator import DEFAULT_OPERATOR, OPERATORS
 
     suffix = Path(output).suffix.lower()
     if suffix not in (".exr", ".png"):
@@ -223,8 +234,9 @@ def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
     settings = parse_settings(options["settings"])
     if png is not None and options["operator"]:
         operator = chosen_operator(options["operator"], settings)
-    elif png is None and (options["operator"] or settings):
-        raise click.UsageError("--operator: nothing is tone mapped; want --png or OUTPUT.png")
+    elif png is None:
+        _no_picture(options)
+    first = times[0] if times else 0.0
     return Job(
         stage=stage,
         times=[float("nan")] if options["default_time"] else times,
@@ -235,6 +247,15 @@ def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
         height=options["image_height"],
         operator=operator,
         parameters=settings,
+        observer=chosen_observer(options),
+        screen=chosen_screen(options),
+        start=chosen_start(options, operator or OPERATORS[DEFAULT_OPERATOR], first),
+        cut=options["cut"],
+        cuts=chosen_cuts(options),
+        states=options["state_out"] or (beside(png, ".json") if png else None),
+        log=beside(png, ".csv") if png else None,
+        plot=plot_file(png or "", options),
+        video=options["video"],
         reflection=options["reflection"],
         gamma=options["gamma"],
         purposes=_purposes(options["purposes"]),
@@ -253,6 +274,21 @@ def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
         compression=options["compression"],
         resume=options["resume"],
     )
+
+
+#: Options that say how a picture is made of a frame.
+_OF_PICTURES = (
+    *("operator", "settings", "observer", "screen", "glare", "video", "plot", "cuts"),
+    *("adapt_from", "state_in", "state_out"),
+)
+
+
+def _no_picture(options: dict[str, Any]) -> None:
+    """Raise UsageError for options that want a picture where there is none."""
+    for name in _OF_PICTURES:
+        if options[name]:
+            option = "set" if name == "settings" else name.replace("_", "-")
+            raise click.UsageError(f"--{option}: nothing is tone mapped; want --png or OUTPUT.png")
 
 
 def _purposes(text: str) -> list[str]:

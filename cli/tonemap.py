@@ -5,12 +5,22 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 
 from hdrusd.errors import InputError
 from hdrusd.frames import check_pattern, find_frames, frame_path, has_placeholder, parse_frames
 
+from .eye_options import (
+    beside,
+    chosen_cuts,
+    chosen_observer,
+    chosen_screen,
+    chosen_start,
+    eye_options,
+    plot_file,
+)
 from .options import (
     chosen_operator,
     finish,
@@ -31,28 +41,36 @@ from .options import (
     metavar="FRAMESPEC[,FRAMESPEC]",
     help="Frames of a numbered sequence. [default: all that exist]",
 )
+@click.option(
+    "--sequence/--stills",
+    default=True,
+    show_default=True,
+    help="Frames are one course in time, or each is seen for long enough alone.",
+)
+@click.option(
+    "--fps",
+    type=click.FloatRange(0.01, 1000.0),
+    help="Frames a second. [default: what the frames say, else 24]",
+)
+@click.option(
+    "--field",
+    "across",
+    type=click.FloatRange(0.1, 179.0),
+    metavar="DEGREES",
+    help="Width of the view. [default: the camera's that the frame states, else the screen's, "
+    "else 40 for the larger side]",
+)
 @click.option("--reference", is_flag=True, help="On the CPU, by the NumPy definition.")
 @click.option("--resume", is_flag=True, help="Skip pictures that are there.")
+@eye_options
 @operator_options
 @report_options
-def command(
-    source: str,
-    output: str,
-    frames: str | None,
-    reference: bool,
-    resume: bool,
-    operator: str | None,
-    settings: tuple[str, ...],
-    report_file: Path | None,
-    strict: bool,
-    as_json: bool,
-    quiet: bool,
-) -> None:
+def command(source: str, output: str, **options: Any) -> None:
     """Tone map SOURCE (.exr, 1.0 = 1 cd/m2) into OUTPUT (.png); both may hold ####."""
     if Path(output).suffix.lower() != ".png":
         raise click.UsageError(f"{output}: want a name that ends in .png")
-    if frames is not None:
-        times = parse_frames(frames)
+    if options["frames"] is not None:
+        times = parse_frames(options["frames"])
         check_pattern(source, times)
         pairs = [(time, frame_path(source, time)) for time in times]
     else:
@@ -65,30 +83,55 @@ def command(
     from hdrusd.report import Report
 
     report = Report()
-    parameters = parse_settings(settings)
-    chosen = chosen_operator(operator, parameters)
-    jobs = [(file, frame_path(output, time)) for time, file in pairs]
+    showing = _showing(output, pairs[0][0], options)
+    label = showing.viewing.operator.name
+    jobs = [(time, file, frame_path(output, time)) for time, file in pairs]
     written: list[str] = []
     with click.progressbar(
-        length=len(jobs), label=chosen.name, file=sys.stderr, hidden=not sys.stderr.isatty()
+        length=len(jobs), label=label, file=sys.stderr, hidden=not sys.stderr.isatty()
     ) as bar:
-        for file in tonemap_sequence(
-            jobs, chosen, parameters, report, reference=reference, resume=resume
-        ):
-            if file is not None:
-                written.append(str(file))
+        for seen in tonemap_sequence(jobs, showing, report):
+            if seen.shown is not None:
+                written.append(str(seen.file))
             bar.update(1)
     document = report.as_dict() | {
         "files": written,
         "frames": len(jobs),
         "skipped": len(jobs) - len(written),
     }
-    if report_file is not None:
-        write_report(report_file, document)
-    tell(report, quiet)
-    if as_json:
+    if options["report_file"] is not None:
+        write_report(options["report_file"], document)
+    tell(report, options["quiet"])
+    if options["as_json"]:
         click.echo(json.dumps(document))
     else:
         for name in written:
             click.echo(name)
-    finish(report, strict)
+    finish(report, options["strict"])
+
+
+def _showing(output: str, first: float, options: dict[str, Any]) -> Any:
+    """The options as a Showing. Raises UsageError, InputError, ParameterError."""
+    from hdrusd.display import Showing
+    from hdrusd.eye.screen import Screen
+    from hdrusd.viewing import Viewing
+
+    parameters = parse_settings(options["settings"])
+    operator = chosen_operator(options["operator"], parameters)
+    screen = chosen_screen(options) or Screen()
+    viewing = Viewing(operator, parameters, chosen_observer(options), screen)
+    return Showing(
+        viewing,
+        start=chosen_start(options, operator, first),
+        cut=options["cut"],
+        cuts=chosen_cuts(options),
+        stills=not options["sequence"],
+        fps=options["fps"],
+        across=options["across"] or screen.field,
+        states=options["state_out"] or (beside(output, ".json") if options["sequence"] else None),
+        log=beside(output, ".csv"),
+        plot=plot_file(output, options),
+        video=options["video"],
+        resume=options["resume"],
+        reference=options["reference"],
+    )

@@ -1,4 +1,4 @@
-// Luminance (ITU-R BT.709-6), sRGB (IEC 61966-2-1), gamut and dither; twin of colour.py
+// Luminance (ITU-R BT.709-6), gamut, what screens decode, dither; twin of colour.py
 
 const vec3 LUMINANCE_WEIGHTS = vec3(0.2126, 0.7152, 0.0722);
 const float BRIGHTEST = 1e12;  // cd/m2 that stand for infinity
@@ -49,6 +49,61 @@ vec3 srgb_decode(vec3 code)
 {
     vec3 curve = pow((max(code, 0.04045) + 0.055) / 1.055, vec3(2.4));
     return mix(code / 12.92, curve, greaterThan(code, vec3(0.04045)));
+}
+
+// Display-linear [0, 1] to code values of a screen that is a plain power, and back.
+vec3 gamma_encode(vec3 linear, float gamma)
+{
+    return pow(linear, vec3(1.0 / gamma));
+}
+
+vec3 gamma_decode(vec3 code, float gamma)
+{
+    return pow(code, vec3(gamma));
+}
+
+// Display-linear [0, 1] to code values of a BT.1886 screen with black and white in cd/m2, and back.
+vec3 bt1886_encode(vec3 linear, float black, float white)
+{
+    float low = pow(black, 1.0 / 2.4), high = pow(white, 1.0 / 2.4);
+    return (pow(black + linear * (white - black), vec3(1.0 / 2.4)) - low) / (high - low);
+}
+
+vec3 bt1886_decode(vec3 code, float black, float white)
+{
+    float low = pow(black, 1.0 / 2.4), high = pow(white, 1.0 / 2.4);
+    return (pow(low + code * (high - low), vec3(2.4)) - black) / (white - black);
+}
+
+const float PQ_PEAK = 10000.0;  // cd/m2 at the top of SMPTE ST 2084
+
+// cd/m2 to code values [0, 1] (SMPTE ST 2084), and back.
+vec3 pq_encode(vec3 light)
+{
+    vec3 y = pow(clamp(light / PQ_PEAK, 0.0, 1.0), vec3(0.1593017578125));
+    return pow((0.8359375 + 18.8515625 * y) / (1.0 + 18.6875 * y), vec3(78.84375));
+}
+
+vec3 pq_decode(vec3 code)
+{
+    vec3 e = pow(code, vec3(1.0 / 78.84375));
+    vec3 y = max(e - 0.8359375, 0.0) / (18.8515625 - 18.6875 * e);
+    return PQ_PEAK * pow(y, vec3(1.0 / 0.1593017578125));
+}
+
+// Linear Rec. 709 in linear Rec. 2020 (ITU-R BT.2087), and back; a line a channel.
+vec3 to_rec2020(vec3 rgb)
+{
+    return rgb * mat3(0.627403914, 0.329283039, 0.043313048,
+                      0.069097292, 0.919540395, 0.011362316,
+                      0.016391439, 0.088013308, 0.895595253);
+}
+
+vec3 from_rec2020(vec3 rgb)
+{
+    return rgb * mat3(1.660490954, -0.587641126, -0.072849828,
+                      -0.124550476, 1.132899898, -0.008349426,
+                      -0.018150763, -0.100578898, 1.118729661);
 }
 
 // Code steps in (-0.5, 0.5) for the pixel x to the right and y down.

@@ -1,4 +1,4 @@
-"""Luminance, the sRGB transfer functions, gamut and dither; twin of colour.glsl.
+"""Luminance, gamut, what screens decode (sRGB, gamma, BT.1886, PQ), dither; twin of colour.glsl.
 
 RGB is linear with Rec. 709 primaries and D65 white; arrays are (..., 3). Scene
 values are absolute, (1, 1, 1) being 1 cd/m2; display values are relative, 1 being
@@ -19,6 +19,21 @@ Array = npt.NDArray[Any]
 #: cd/m2 that stand for infinity: past anything seen (the sun's disc is 1.6e9), and low
 #: enough for products of two such numbers in float32.
 BRIGHTEST = 1e12
+
+#: Linear Rec. 709 to linear Rec. 2020, both of D65 white (ITU-R BT.2087); a row a channel.
+REC709_TO_REC2020 = np.array(
+    [
+        [0.627403914, 0.329283039, 0.043313048],
+        [0.069097292, 0.919540395, 0.011362316],
+        [0.016391439, 0.088013308, 0.895595253],
+    ]
+)
+REC2020_TO_REC709 = np.linalg.inv(REC709_TO_REC2020)
+
+#: cd/m2 at the top of SMPTE ST 2084, and its constants.
+PQ_PEAK = 10000.0
+_M1, _M2 = 2610.0 / 16384.0, 2523.0 / 32.0
+_C1, _C2, _C3 = 3424.0 / 4096.0, 2413.0 / 128.0, 2392.0 / 128.0
 
 #: Luminance below which a colour has no chromaticity (never divide by less).
 DARKEST = 1e-9
@@ -86,6 +101,56 @@ def srgb_decode(code: npt.ArrayLike) -> Array:
     code = np.asarray(code)
     curve = ((np.maximum(code, 0.04045) + 0.055) / 1.055) ** 2.4
     return np.where(code > 0.04045, curve, code / 12.92)
+
+
+def gamma_encode(linear: npt.ArrayLike, gamma: float) -> Array:
+    """Display-linear [0, 1] to code values [0, 1] of a screen that is a plain power."""
+    return np.asarray(np.asarray(linear) ** (1.0 / gamma))
+
+
+def gamma_decode(code: npt.ArrayLike, gamma: float) -> Array:
+    """Undo ``gamma_encode``."""
+    return np.asarray(np.asarray(code) ** gamma)
+
+
+def bt1886_encode(linear: npt.ArrayLike, black: float, white: float) -> Array:
+    """Display-linear [0, 1] to code values [0, 1] of an ITU-R BT.1886 screen.
+
+    ``black`` and ``white`` in cd/m2 are the screen's own, without reflections: code values
+    are even in the power 1/2.4 of the luminance between them.
+    """
+    low, high = black ** (1.0 / 2.4), white ** (1.0 / 2.4)
+    light = black + np.asarray(linear) * (white - black)
+    return np.asarray((light ** (1.0 / 2.4) - low) / (high - low))
+
+
+def bt1886_decode(code: npt.ArrayLike, black: float, white: float) -> Array:
+    """Undo ``bt1886_encode``: L = a max(V + b, 0)^2.4 of the recommendation, display-linear."""
+    low, high = black ** (1.0 / 2.4), white ** (1.0 / 2.4)
+    light = (low + np.asarray(code) * (high - low)) ** 2.4
+    return np.asarray((light - black) / (white - black))
+
+
+def pq_encode(light: npt.ArrayLike) -> Array:
+    """cd/m2, up to 10,000, to code values [0, 1] (SMPTE ST 2084)."""
+    y = (np.clip(light, 0.0, PQ_PEAK) / PQ_PEAK) ** _M1
+    return np.asarray(((_C1 + _C2 * y) / (1.0 + _C3 * y)) ** _M2)
+
+
+def pq_decode(code: npt.ArrayLike) -> Array:
+    """Undo ``pq_encode``: code values [0, 1] to cd/m2."""
+    e = np.asarray(code) ** (1.0 / _M2)
+    return np.asarray(PQ_PEAK * (np.maximum(e - _C1, 0.0) / (_C2 - _C3 * e)) ** (1.0 / _M1))
+
+
+def to_rec2020(rgb: npt.ArrayLike) -> Array:
+    """Linear Rec. 709 (..., 3) in linear Rec. 2020."""
+    return np.asarray(np.asarray(rgb) @ REC709_TO_REC2020.T)
+
+
+def from_rec2020(rgb: npt.ArrayLike) -> Array:
+    """Linear Rec. 2020 (..., 3) in linear Rec. 709; negative outside of its gamut."""
+    return np.asarray(np.asarray(rgb) @ REC2020_TO_REC709.T)
 
 
 def dither(x: npt.ArrayLike, y: npt.ArrayLike) -> Array:

@@ -1,4 +1,4 @@
-"""A legacy database becomes a photometric USD stage: ``convert`` in ten steps."""
+"""A legacy database becomes a photometric USD stage: ``convert`` in eleven steps."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from hdrusd.photometry.light import PhotometricLight, chromaticity
 from hdrusd.photometry.sidecar import FILE_NAME, Rule, Sidecar, read_sidecar
 from hdrusd.report import Kind, Report
 from hdrusd.surfaces import SurfaceMaker, colored_materials, material_rows
+from hdrusd.usd.fixtures import Lamp
 from hdrusd.usd.material import write_look, write_photometric
 from hdrusd.usd.mesh import COLOR_PRIMVAR
 from hdrusd.usd.settings import Settings
@@ -155,6 +156,7 @@ class _Lamp:
     light: PhotometricLight
     right: legacy.Vec3 | None = None  # where C = 0 of its photometric file points
     flux: float | None = None  # lm of its photometric file
+    shaded: bool = False  # by its own fixture too
 
     def row(self, path: str) -> dict[str, Any]:
         """The account of it for the report."""
@@ -193,6 +195,7 @@ class _Conversion:
             up=options.up or self.scene.up,
         )
         self.result = Result(output, report, self.scene.counts())
+        self.lamps: list[tuple[_Lamp, Lamp]] = []
 
     def run(self) -> Result:
         """The steps, in order."""
@@ -212,6 +215,7 @@ class _Conversion:
             raise InputError(self.scene.source, "nothing in it that can be used; see the findings")
         camera = self._write_cameras()
         self._show_nodes()
+        self._free_lamps()
         self.writer.write_settings(
             Settings(camera=camera, resolution=_RESOLUTION, operator="reinhard02")
         )
@@ -265,13 +269,16 @@ class _Conversion:
                 if meaning is not None and meaning.kind == "ambient":
                     ambients.append(meaning)
                 elif meaning is not None:
-                    lamp = _Lamp(place, light, meaning)
+                    shaded = rule is not None and bool(rule.values.get("fixture_shadow"))
+                    lamp = _Lamp(place, light, meaning, shaded=shaded)
                     if rule is not None and file is not None:
                         lamp = self._aimed(lamp, rule, file)
                     lamps.append(lamp)
         for lamp in lamps:
             prim = self.writer.write_light(lamp.place, lamp.source, lamp.light, lamp.right)
             self.result.lights.append(lamp.row(str(prim.GetPath())))
+            if lamp.light.kind in ("point", "spot") and not lamp.shaded:
+                self.lamps.append((lamp, Lamp(prim, lamp.light)))
         ambient = self._ambient(ambients)
         if ambient is not None:
             path = self.writer.write_ambient(ambient).GetPath()
@@ -352,6 +359,25 @@ class _Conversion:
             rule = self.sidecar.match("node", place.node.name)
             if rule is not None and "visible" in rule.values:
                 self.writer.set_visible(place, visible=rule.values["visible"])
+
+    def _free_lamps(self) -> None:
+        """Lamps inside their own fixtures shine out of them."""
+        self.writer.free_lamps([it for _, it in self.lamps])
+        for lamp, it in self.lamps:
+
+            def note(code: str, text: str, source: legacy.Light = lamp.source) -> None:
+                self.report.add(Kind.ASSUMED, code, source.source, source.name, text)
+
+            for mesh in it.fixtures:
+                note("fixture-shadow", f"stands inside {mesh.path}, its fixture: no shadow of it")
+            if it.too_large is not None:
+                note(
+                    "fixture-large",
+                    f"held by {it.too_large.path}, which is too large to be its fixture and "
+                    "shades it; want a mesh of the fixture alone",
+                )
+            if not it.looked_at:
+                note("fixture-search", "too much about it to look for its fixture")
 
     def _validate(self) -> None:
         stage = Usd.Stage.Open(str(self.folder / self.output.name))

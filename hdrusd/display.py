@@ -1,102 +1,262 @@
-"""The second half alone: frames in cd/m2 become pictures for a display."""
+"""The second half alone: frames in cd/m2 become pictures for a display, an eye between them."""
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import moderngl
 import numpy as np
-import numpy.typing as npt
 
-from hdrusd.colour import dither, quantise, srgb_encode
+from hdrusd.by_products import ByProducts
+from hdrusd.course import Checkpoints, Course, Cut, Start
 from hdrusd.errors import SourceRef
 from hdrusd.gpu.context import create_context
-from hdrusd.gpu.ldr import ToneMapper
-from hdrusd.gpu.measure import Measurer
 from hdrusd.gpu.program import Programs
-from hdrusd.images import REC709, read_exr, write_png
+from hdrusd.images import REC709, read_exr, read_exr_header, write_png
 from hdrusd.report import Kind, Report
-from hdrusd.tonemap.falsecolour import OPERATOR as FALSE_COLOUR
-from hdrusd.tonemap.legend import SMALLEST, paint_legend
-from hdrusd.tonemap.operator import Operator, Parameters, Statistics
+from hdrusd.tonemap.operator import Moment
+from hdrusd.viewing import Eye, ReferenceEye, Shown, Sight, Viewing
 
 #: Pictures that wait for the writer; each holds a frame in memory.
 _WAITING = 2
 
-
-class Display:
-    """Shader 2 with its measurements: an HDR texture becomes a picture."""
-
-    def __init__(self, ctx: moderngl.Context, programs: Programs, operator: Operator) -> None:
-        self.operator = operator
-        self.mapper = ToneMapper(ctx, programs)
-        self.measurer = Measurer(ctx, programs)
-
-    def show(
-        self, hdr: moderngl.Texture, parameters: Parameters, *, top_first: bool = False
-    ) -> tuple[npt.NDArray[np.uint8], Statistics | None]:
-        """The picture, (h, w, 3) sRGB, top row first, and what was measured for it."""
-        settings = self.operator.settings(parameters)
-        statistics = self.measurer.measure(hdr, self.operator.needs(settings))
-        picture = self.mapper.apply(hdr, self.operator, settings, statistics, top_first=top_first)
-        add_legend(picture, self.operator, settings)
-        return picture, statistics
+#: Frames a second where neither the user nor the file says (UsdStage's default).
+DEFAULT_FPS = 24.0
 
 
-def add_legend(picture: npt.NDArray[np.uint8], operator: Operator, settings: Parameters) -> None:
-    """The cd/m2 scale on a false colour picture that has room for it, in place."""
-    room = all(have >= need for have, need in zip(picture.shape, SMALLEST, strict=False))
-    if operator.name == FALSE_COLOUR.name and room:
-        paint_legend(picture, float(settings["scale"] or 0), float(settings["decades"] or 0))
+@dataclass(frozen=True, slots=True)
+class Showing:
+    """How a sequence is looked at.
+
+    ``stills``: each frame by an eye that has looked at it for long enough. ``fps``: frames a
+    second; None: what the frames say. ``states``: the file of Checkpoints. ``cuts``: numbers of
+    frames that begin a new view. ``reference``: by the NumPy definition instead of the GPU.
+    """
+
+    viewing: Viewing
+    start: Start = field(default_factory=Start)
+    cut: Cut = "keep"
+    cuts: Collection[float] = ()
+    stills: bool = False
+    fps: float | None = None
+    across: float | None = None  # width in degrees; None: what the frames say
+    states: Path | None = None
+    log: Path | None = None  # table of what the eye went through, CSV
+    plot: Path | None = None
+    video: Path | None = None
+    resume: bool = False
+    reference: bool = False
+
+    def course(self) -> Course:
+        """The eye before the first frame."""
+        return Course(self.viewing.operator, self.start, self.cut, self.cuts)
+
+    def setup(self) -> dict[str, Any]:
+        """All that states depend on beside the frames, as JSON has it."""
+        viewing, start = self.viewing, self.start
+        return {
+            **viewing.setup(),
+            "start": asdict(start),
+            "cut": self.cut,
+            "cuts": sorted(self.cuts),
+            "fps": self.fps,
+            "across": self.across,
+        }
 
 
-def encode(linear: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
-    """Display-linear [0, 1], (h, w, 3), as dithered 8-bit sRGB: what shader 2 does last."""
-    rows, columns = np.mgrid[0 : linear.shape[0], 0 : linear.shape[1]]
-    offset = dither(columns, rows)[..., None]  # the same for all three channels
-    return np.asarray(quantise(srgb_encode(linear), offset), np.uint8)
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A frame of a sequence. ``shown`` is None where its picture was there already."""
+
+    frame: float
+    file: Path
+    time: float
+    moment: Moment | None
+    shown: Shown | None
 
 
 def tonemap_sequence(
-    jobs: Sequence[tuple[Path, Path]],
-    operator: Operator,
-    parameters: Parameters,
-    report: Report,
-    *,
-    reference: bool = False,
-    resume: bool = False,
-) -> Iterator[Path | None]:
-    """Tone map EXR files into PNG files, in order; None for one that ``resume`` skipped.
+    jobs: Sequence[tuple[float, Path, Path]], showing: Showing, report: Report
+) -> Iterator[Seen]:
+    """Frames (number, EXR, PNG) become pictures, in the order in which they are seen.
 
-    ``reference``: by the NumPy definition instead of the GPU. A file that does not say
-    what its numbers are is taken as Rec. 709 in cd/m2, a finding. Raises InputError,
-    ContextError.
+    A frame whose picture is there is skipped with ``resume``; the eye goes on from the state
+    that is known before the first one that is not, so that pictures are what they are
+    without a break. A file that does not say what its numbers are is taken as Rec. 709 in
+    cd/m2, a finding. Raises InputError, ContextError.
     """
-    display: Display | None = None
-    with Writer() as writer:
-        for source, target in jobs:
-            if resume and target.is_file():
-                yield None
-                continue
-            rgb, header = read_exr(source)
-            _note_units(source, header, report)
-            if reference:
-                settings = operator.settings(parameters)
-                picture = encode(operator.apply(rgb, None, settings))
-                add_legend(picture, operator, settings)
-            else:
-                if display is None:
-                    ctx = create_context()
-                    display = Display(ctx, Programs(ctx), operator)
-                texture = display.mapper.upload(rgb)
-                picture, _ = display.show(texture, parameters, top_first=True)
-            writer.submit(write_png, target, picture)
-            yield target
+    operator = showing.viewing.operator
+    in_time = operator.advance is not None and not showing.stills
+    states = None
+    if in_time and showing.states is not None:
+        states = Checkpoints(showing.states, operator.name, showing.setup())
+        if showing.resume:
+            states.load()
+    course = showing.course()
+    begin = 0
+    if in_time and showing.resume:
+        done = [target.is_file() for _, _, target in jobs]
+        begin = first_to_see([frame for frame, _, _ in jobs], done, course, states)
+    eye: _Eye | None = None
+    clock = _Clock(showing.fps, report if in_time and len(jobs) > 1 else Report())
+    with Writer() as writer, _by_products(jobs, showing) as beside:
+        try:
+            for index, (frame, source, target) in enumerate(jobs):
+                there = showing.resume and target.is_file()
+                if index < begin or (there and not in_time):
+                    beside.add(frame, math.nan, None, None, target)
+                    yield Seen(frame, target, math.nan, None, None)
+                    continue
+                eye = eye or _Eye(showing, course)
+                rgb, header = read_exr(source)
+                _note_units(source, header, report)
+                time = clock.time(frame, source, header)
+                angles = field_of(header, rgb.shape[1], rgb.shape[0], showing.across)
+                moment, shown = eye.look(rgb, Sight(time, frame, angles), picture=not there)
+                if states is not None:
+                    states.keep(frame, time, moment.state)
+                beside.add(frame, time, moment, shown.picture if shown else None, target)
+                if shown is not None:
+                    writer.submit(write_png, target, shown.picture)
+                yield Seen(frame, target, time, moment, shown)
+        finally:
+            if states is not None:
+                states.save()
+            if eye is not None:
+                eye.release()
+
+
+def _by_products(jobs: Sequence[tuple[float, Path, Path]], showing: Showing) -> ByProducts:
+    operator = showing.viewing.operator
+    fps = showing.fps
+    if fps is None and showing.video is not None:
+        fps = rate_of(read_exr_header(jobs[0][1]))
+    return ByProducts(
+        operator,
+        csv=None if operator.advance is None or showing.stills else showing.log,
+        plot=showing.plot,
+        video=showing.video,
+        fps=fps or DEFAULT_FPS,
+        resume=showing.resume,
+    )
+
+
+def first_to_see(
+    frames: Sequence[float], done: Sequence[bool], course: Course, states: Checkpoints | None
+) -> int:
+    """Index of the frame with which an interrupted sequence goes on.
+
+    That after the latest known state before the first frame that is not ``done``; ``course`` then
+    has this state. Without one, 0; where all is done, past the end.
+    """
+    missing = next((i for i, there in enumerate(done) if not there), len(done))
+    if missing == len(done):
+        return missing
+    for index in range(missing - 1, -1, -1):
+        if states is not None and (known := states.states.get(frames[index])) is not None:
+            course.resume(known[1], known[0])
+            return index + 1
+    return 0
+
+
+class _Eye:
+    """Eye or ReferenceEye for frames from files; a new one for each still."""
+
+    def __init__(self, showing: Showing, course: Course) -> None:
+        self.showing = showing
+        self._numpy: ReferenceEye | None = None
+        self._gpu: Eye | None = None
+        if showing.reference:
+            self._numpy = ReferenceEye(showing.viewing, course)
+        else:
+            ctx = create_context()
+            self._gpu = Eye(ctx, Programs(ctx), showing.viewing, course)
+
+    def look(
+        self, rgb: np.ndarray[Any, Any], sight: Sight, *, picture: bool
+    ) -> tuple[Moment, Shown | None]:
+        eye = self._numpy or self._gpu
+        assert eye is not None
+        if self.showing.stills:
+            eye.course = self.showing.course()
+        frame: Any = rgb
+        options: dict[str, Any] = {}
+        if self._gpu is not None:
+            frame, options = self._gpu.upload(rgb), {"top_first": True}
+        if not picture:
+            return eye.see(frame, sight, **options), None
+        shown = eye.show(frame, sight, **options)
+        return shown.moment, shown
+
+    def release(self) -> None:
+        if self._gpu is not None:
+            self._gpu.release()
+
+
+class _Clock:
+    """Seconds of frames by their numbers and what the first of them says."""
+
+    def __init__(self, fps: float | None, report: Report) -> None:
+        self.fps = fps
+        self.report = report
+
+    def time(self, frame: float, source: Path, header: Mapping[str, Any]) -> float:
+        if self.fps is None:
+            self.fps = rate_of(header)
+            if self.fps is None:
+                self.fps = DEFAULT_FPS
+                text = f"no rate; {DEFAULT_FPS:g} frames a second are assumed, see --fps"
+                self.report.add(Kind.ASSUMED, "exr-rate", SourceRef(source), "", text)
+        number = header.get("hdrusd:frame")
+        known = isinstance(number, (int, float)) and math.isfinite(number)
+        return (float(number) if known else frame) / self.fps  # type: ignore[arg-type]
+
+
+def rate_of(header: Mapping[str, Any]) -> float | None:
+    """Frames a second that an EXR states: ours, or OpenEXR's ratio; None where it states none."""
+    said: Any = header.get("hdrusd:timeCodesPerSecond", header.get("framesPerSecond"))
+    try:
+        rate = float(said)
+    except (TypeError, ValueError):
+        try:
+            rate = float(said.n) / float(said.d)
+        except (AttributeError, TypeError, ValueError, ZeroDivisionError):
+            return None
+    return rate if math.isfinite(rate) and rate > 0.0 else None
+
+
+def field_of(
+    header: Mapping[str, Any], width: int, height: int, across: float | None = None
+) -> tuple[float, float] | None:
+    """Width and height in degrees of an EXR frame by its camera's matrices, which it may state.
+
+    ``across``: the width in degrees, which is believed before them. None where neither is known,
+    and for an orthographic camera.
+    """
+    if across is not None:
+        half = math.tan(math.radians(across) / 2.0)
+        return across, math.degrees(2.0 * math.atan(half * height / width))
+    try:
+        view = np.asarray(header["worldToCamera"], np.float64).reshape(4, 4)
+        ndc = np.asarray(header["worldToNDC"], np.float64).reshape(4, 4)
+        projection = np.linalg.inv(view) @ ndc
+    except (KeyError, ValueError, TypeError, np.linalg.LinAlgError):
+        return None
+    if not np.isfinite(projection).all() or abs(projection[2, 3]) < 1e-3:
+        return None
+    scale = abs(projection[0, 0] / projection[2, 3]), abs(projection[1, 1] / projection[2, 3])
+    if min(scale) < 1e-3:
+        return None
+    return (
+        math.degrees(2.0 * math.atan(1.0 / scale[0])),
+        math.degrees(2.0 * math.atan(1.0 / scale[1])),
+    )
 
 
 def _note_units(source: Path, header: Mapping[str, Any], report: Report) -> None:

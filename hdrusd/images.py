@@ -189,12 +189,25 @@ def read_exr(path: Path) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
     return (rgb if white == 1.0 else (rgb * white).astype(np.float32)), header
 
 
-def write_png(path: Path, pixels: npt.NDArray[np.uint8], comment: str = "") -> None:
-    """Write display-encoded sRGB, (h, w, 1 to 4) uint8, top row first, alpha apart."""
+def read_exr_header(path: Path) -> dict[str, Any]:
+    """What an EXR says of itself, without its pixels. Raises InputError."""
+    if not path.is_file():
+        raise InputError(path, "no such file")
+    try:
+        with OpenEXR.File(str(path), header_only=True) as file:
+            return dict(file.header())
+    except (RuntimeError, ValueError, TypeError, KeyError) as problem:
+        raise InputError(path, f"not a readable EXR ({_first_line(str(problem))})") from problem
+
+
+def write_png(path: Path, pixels: npt.NDArray[Any], comment: str = "") -> None:
+    """Write code values, (h, w, 1 to 4) uint8 or uint16, top row first, alpha apart."""
     h, w, channels = pixels.shape
 
     def write(temporary: Path) -> None:
-        spec = oiio.ImageSpec(w, h, channels, oiio.UINT8)
+        spec = oiio.ImageSpec(
+            w, h, channels, oiio.UINT16 if pixels.dtype == np.uint16 else oiio.UINT8
+        )
         spec.attribute("oiio:ColorSpace", "sRGB")
         spec.attribute("oiio:UnassociatedAlpha", 1)  # else colours are divided by alpha
         spec.attribute("png:compressionLevel", 4)

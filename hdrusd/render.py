@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
-import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
-from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
+from pxr import Tf, UsdGeom
 
-from hdrusd.display import Display, Writer
+from hdrusd.by_products import ByProducts
+from hdrusd.course import Checkpoints, Course, Cut, Start, state_text
+from hdrusd.display import Writer, first_to_see
 from hdrusd.errors import HdrusdError, InputError, SourceRef
+from hdrusd.eye.observer import Observer
+from hdrusd.eye.screen import Screen
 from hdrusd.frames import frame_path
 from hdrusd.gpu.hdr import HdrRenderer, Options, Reflection
 from hdrusd.gpu.lights import LightMode
@@ -24,12 +26,13 @@ from hdrusd.gpu.program import Programs
 from hdrusd.images import Compression, half_clipped, write_exr, write_png
 from hdrusd.report import Kind, Report
 from hdrusd.scene import Camera
-from hdrusd.tonemap.operator import DEFAULT_OPERATOR, OPERATORS, Operator, Parameters, Statistics
+from hdrusd.tonemap.operator import DEFAULT_OPERATOR, OPERATORS, Moment, Operator, Parameters
 from hdrusd.units import TEXTURE_GAMMA
 from hdrusd.usd.extract import StageReader
+from hdrusd.usd.opening import one_line_of, open_stage, usd_warnings
 from hdrusd.usd.settings import read_settings
 from hdrusd.usd.textures import TextureLoader
-from hdrusd.usd.variants import select_variants
+from hdrusd.viewing import Eye, Sight, Viewing, reads_screen
 
 #: Width of a picture that neither the stage nor the user sizes (usdrecord's).
 DEFAULT_WIDTH = 960
@@ -51,6 +54,15 @@ class Job:
     height: int | None = None
     operator: Operator | None = None  # None: the stage's, where a PNG is asked for
     parameters: Parameters = field(default_factory=dict)
+    observer: Observer = field(default_factory=Observer)
+    screen: Screen | None = None  # None: the stage's peak and black, else Screen's own
+    start: Start = field(default_factory=Start)
+    cut: Cut = "keep"
+    cuts: Sequence[float] = ()
+    states: Path | None = None  # file of Checkpoints
+    log: Path | None = None  # table of what the eye went through, CSV
+    plot: Path | None = None
+    video: Path | None = None
     reflection: Reflection = "lambert"
     gamma: float = TEXTURE_GAMMA
     purposes: Sequence[str] = ("render",)
@@ -76,92 +88,12 @@ class Frame:
 
     time: float
     hdr: npt.NDArray[np.float32]  # (h, w, 3) cd/m2, top row first
-    ldr: npt.NDArray[np.uint8] | None  # (h, w, 3) sRGB
-    statistics: Statistics | None
+    ldr: npt.NDArray[Any] | None  # (h, w, 3) code values
+    moment: Moment | None  # what the eye made of it, where there is a picture
     camera: Camera
     files: tuple[Path, ...] = ()
     skipped: bool = False
     light_error: float = 0.0  # bound of merging lamps (HdrRenderer.light_error); 0: each alone
-
-
-def open_stage(
-    path: Path,
-    mask: Sequence[str] = (),
-    session: Path | None = None,
-    report: Report | None = None,
-    variants: Sequence[str] = (),
-) -> Usd.Stage:
-    """Open a stage, all of it or what ``mask`` names, with these ``variants`` (PRIM:SET=NAME).
-
-    ``report``: takes what USD warns of (arcs that lead nowhere or in a circle), which
-    otherwise goes to standard error. Raises InputError.
-    """
-    paths = [_mask_path(path, name) for name in mask]
-    root, over = _layer(path), None if session is None else _layer(session)
-    if variants:  # over the user's session layer, which is a file and stays as it is
-        choices = Sdf.Layer.CreateAnonymous("session.usda")
-        choices.subLayerPaths = [] if over is None else [over.identifier]
-        over = choices
-    layers = [root, over] if over is not None else [root]
-    with usd_warnings(path, report):
-        try:
-            if mask:
-                stage = Usd.Stage.OpenMasked(*layers, Usd.StagePopulationMask(paths))
-            else:
-                stage = Usd.Stage.Open(*layers)
-        except Tf.ErrorException as problem:
-            raise InputError(path, f"not a USD stage ({_one_line(problem)})") from problem
-        select_variants(stage, variants, SourceRef(path))
-    for target in paths:
-        if report is not None and not stage.GetPrimAtPath(target):
-            report.add(Kind.MISSING, "mask", SourceRef(path), str(target), "no such prim")
-    return stage
-
-
-@contextlib.contextmanager
-def usd_warnings(path: Path, report: Report | None) -> Iterator[None]:
-    """What USD warns of within the block becomes findings of the stage at ``path``."""
-    if report is None:
-        yield
-        return
-    delegate = UsdUtils.CoalescingDiagnosticDelegate()
-    try:
-        yield
-    finally:
-        for said in delegate.TakeUncoalescedDiagnostics():
-            report.add(Kind.INVALID, "usd-warning", SourceRef(path), "", _warning(said.commentary))
-
-
-def _layer(path: Path) -> Sdf.Layer:
-    if not path.is_file():
-        raise InputError(path, "no such file")
-    try:
-        layer = Sdf.Layer.FindOrOpen(str(path))
-    except Tf.ErrorException as problem:
-        raise InputError(path, f"not a USD layer ({_one_line(problem)})") from problem
-    if layer is None:
-        raise InputError(path, "not a USD layer")
-    return layer
-
-
-def _mask_path(stage: Path, name: str) -> Sdf.Path:
-    path = Sdf.Path(name) if Sdf.Path.IsValidPathString(name) else Sdf.Path()
-    if not (path.IsAbsolutePath() and path.IsAbsoluteRootOrPrimPath()):
-        raise InputError(stage, f"--mask {name}: no prim path; want one like /World/Street")
-    return path
-
-
-def _warning(text: str) -> str:
-    """A warning of USD in one line, without addresses of this process and how it came up."""
-    text = re.sub(r"@anon:[^@]*@|\(instantiating stage on stage [^)]*\)", "", text)
-    return " ".join(text.split())[:300]
-
-
-def _one_line(problem: Exception) -> str:
-    """The first sentence that USD says, without its C++ places."""
-    lines = [line.strip() for line in str(problem).splitlines() if "Error in" in line]
-    text = lines[0].rpartition(" : ")[2] if lines else str(problem)
-    return " ".join(text.split())[:200].strip("' ")
 
 
 class Renderer:
@@ -207,13 +139,20 @@ class Renderer:
             raise HdrusdError(
                 f"{width} x {height} pixels: too large for this device ({problem})"
             ) from problem
-        operator = self._operator()
-        self.display = Display(ctx, programs, operator) if operator is not None else None
+        self.viewing = self._viewing()
+        self.eye: Eye | None = None
+        if self.viewing is not None:
+            course = Course(self.viewing.operator, job.start, job.cut, job.cuts)
+            self.eye = Eye(ctx, programs, self.viewing, course)
 
     @property
     def times(self) -> Sequence[float]:
         """The job's time codes, or the stage's start."""
         return self.job.times if self.job.times is not None else [self.stage.GetStartTimeCode()]
+
+    def seconds(self, time: float) -> float:
+        """When a time code is, in s; the default time is 0."""
+        return time / self.stage.GetTimeCodesPerSecond() if math.isfinite(time) else 0.0
 
     def frame(self, time: float) -> Frame:
         """Render one time code (NaN: the default time). Raises InputError."""
@@ -221,8 +160,13 @@ class Renderer:
             try:
                 return self._frame(time)
             except Tf.ErrorException as problem:
-                text = f"frame {time:g}: {_one_line(problem)}"
+                text = f"frame {time:g}: {one_line_of(problem)}"
                 raise InputError(self.job.stage, text) from problem
+
+    def release(self) -> None:
+        """Free what is on the GPU."""
+        if self.eye is not None:
+            self.eye.release()
 
     def _frame(self, time: float) -> Frame:
         width, height = self.size
@@ -231,12 +175,14 @@ class Renderer:
         scene = self.reader.read(time, camera, sky_visible=self.job.sky_visible)
         texture = self.hdr.render(scene)
         self.textures.publish()
-        statistics, ldr = None, None
-        if self.display is not None:
-            parameters = self._parameters(self.display.operator, camera)
-            ldr, statistics = self.display.show(texture, parameters)
+        moment, ldr = None, None
+        if self.eye is not None and self.viewing is not None:
+            parameters = self._parameters(self.viewing.operator, camera)
+            sight = Sight(self.seconds(time), time, field_of_view(camera), parameters)
+            shown = self.eye.show(texture, sight)
+            moment, ldr = shown.moment, shown.picture
         error = self.hdr.light_error
-        return Frame(time, self.hdr.read(), ldr, statistics, camera, light_error=error)
+        return Frame(time, self.hdr.read(), ldr, moment, camera, light_error=error)
 
     def _check_camera(self, camera: Camera) -> None:
         """A camera that sees nothing would give black frames, silently."""
@@ -248,17 +194,22 @@ class Renderer:
                 f"{camera.name}: sees nothing; want finite numbers, film and focal length above 0",
             )
 
-    def _operator(self) -> Operator | None:
+    def _viewing(self) -> Viewing | None:
         """The user's, else the stage's, else Reinhard's; None where no picture is asked for."""
         job, settings = self.job, self.settings
-        if job.operator is not None or job.png is None:
-            return job.operator
-        operator = OPERATORS[settings.operator or DEFAULT_OPERATOR]
+        if job.operator is None and job.png is None:
+            return None
+        operator = job.operator or OPERATORS[settings.operator or DEFAULT_OPERATOR]
         operator.check(job.parameters)
-        if settings.peak is not None or settings.black is not None:
-            text = f"display peak and black are recorded; {operator.name} does not read them"
-            self.report.add(Kind.DROPPED, "display-unused", SourceRef(job.stage), "", text)
-        return operator
+        screen = job.screen or Screen()
+        if job.screen is None and (settings.peak is not None or settings.black is not None):
+            peak = screen.peak if settings.peak is None else settings.peak
+            black = screen.black if settings.black is None else settings.black
+            screen = replace(screen, name="stage", peak=peak, black=black)
+            if not reads_screen(operator, job.parameters):
+                text = f"display peak and black are recorded; {operator.name} does not read them"
+                self.report.add(Kind.DROPPED, "display-unused", SourceRef(job.stage), "", text)
+        return Viewing(operator, job.parameters, job.observer, screen)
 
     def _parameters(self, operator: Operator, camera: Camera) -> dict[str, Any]:
         """The user's, else the stage's for this operator, else the camera's exposure."""
@@ -300,34 +251,111 @@ class Renderer:
 def render_sequence(ctx: moderngl.Context, job: Job, report: Report) -> Iterator[Frame]:
     """Render and write the frames of a job, in order.
 
-    Encoding overlaps rendering: a thread writes while the next frame is drawn.
-    With ``resume`` a frame whose files are all there is skipped.
+    Encoding overlaps rendering: a thread writes while the next frame is drawn. With ``resume``
+    a frame whose files are all there is skipped; an eye in time goes on from the state that is
+    known before the first one that is not (``first_to_see``).
     """
     renderer = Renderer(ctx, job, report)
-    with Writer() as writer:
-        for time in renderer.times:
-            files = tuple(frame_path(p, time) for p in (job.exr, job.png) if p is not None)
-            if job.resume and files and all(file.is_file() for file in files):
-                blank = np.zeros((0, 0, 3), np.float32)
-                yield Frame(time, blank, None, None, Camera(), files, skipped=True)
-                continue
-            frame = renderer.frame(time)
-            if job.exr is not None:
-                path, header = frame_path(job.exr, time), exr_header(renderer, frame)
-                if job.half and (clipped := half_clipped(frame.hdr)):
-                    text = f"{clipped} pixels are clipped at 65504 cd/m2, where half floats end"
-                    report.add(Kind.CLAMPED, "half-clipped", SourceRef(path), "", text)
-                writer.submit(
-                    write_exr,
-                    path,
-                    frame.hdr,
-                    header,
-                    half=job.half,
-                    compression=job.compression,
+    outputs = [
+        (time, tuple(frame_path(p, time) for p in (job.exr, job.png) if p is not None))
+        for time in renderer.times
+    ]
+    states = _checkpoints(renderer)
+    begin, eye = 0, renderer.eye
+    in_time = eye is not None and eye.course.operator.advance is not None
+    if job.resume and in_time and eye is not None:
+        done = [_all_there(files) for _, files in outputs]
+        begin = first_to_see(renderer.times, done, eye.course, states)
+    with Writer() as writer, _by_products(renderer) as beside:
+        try:
+            for index, (time, files) in enumerate(outputs):
+                there = job.resume and _all_there(files)
+                if index < begin or (there and not in_time):
+                    blank = np.zeros((0, 0, 3), np.float32)
+                    beside.add(
+                        time, renderer.seconds(time), None, None, files[-1] if files else None
+                    )
+                    yield Frame(time, blank, None, None, Camera(), files, skipped=True)
+                    continue
+                frame = renderer.frame(time)
+                if states is not None and frame.moment is not None:
+                    states.keep(time, renderer.seconds(time), frame.moment.state)
+                beside.add(
+                    time,
+                    renderer.seconds(time),
+                    frame.moment,
+                    frame.ldr,
+                    files[-1] if files else None,
                 )
-            if job.png is not None and frame.ldr is not None:
-                writer.submit(write_png, frame_path(job.png, time), frame.ldr)
-            yield replace(frame, files=files)
+                if not there:
+                    _write(renderer, frame, writer)
+                yield replace(frame, files=files, skipped=there)
+        finally:
+            if states is not None:
+                states.save()
+            renderer.release()
+
+
+def _by_products(renderer: Renderer) -> ByProducts:
+    job, viewing = renderer.job, renderer.viewing
+    if viewing is None:
+        return ByProducts(None)
+    in_time = viewing.operator.advance is not None
+    return ByProducts(
+        viewing.operator,
+        csv=job.log if in_time else None,
+        plot=job.plot,
+        video=job.video,
+        fps=renderer.stage.GetTimeCodesPerSecond(),
+        resume=job.resume,
+    )
+
+
+def _all_there(files: Sequence[Path]) -> bool:
+    return bool(files) and all(file.is_file() for file in files)
+
+
+def _checkpoints(renderer: Renderer) -> Checkpoints | None:
+    """Where the states of the eye are kept; None for one without states."""
+    job, viewing = renderer.job, renderer.viewing
+    if viewing is None or viewing.operator.advance is None or job.states is None:
+        return None
+    setup = {
+        **viewing.setup(),
+        "stage": job.stage.name,
+        "camera": str(renderer.camera_path),
+        "size": list(renderer.size),
+        "start": asdict(job.start),
+        "cut": job.cut,
+        "cuts": sorted(job.cuts),
+    }
+    states = Checkpoints(job.states, viewing.operator.name, setup)
+    if job.resume:
+        states.load()
+    return states
+
+
+def _write(renderer: Renderer, frame: Frame, writer: Writer) -> None:
+    job = renderer.job
+    if job.exr is not None:
+        path, header = frame_path(job.exr, frame.time), exr_header(renderer, frame)
+        if job.half and (clipped := half_clipped(frame.hdr)):
+            text = f"{clipped} pixels are clipped at 65504 cd/m2, where half floats end"
+            renderer.report.add(Kind.CLAMPED, "half-clipped", SourceRef(path), "", text)
+        writer.submit(
+            write_exr, path, frame.hdr, header, half=job.half, compression=job.compression
+        )
+    if job.png is not None and frame.ldr is not None:
+        writer.submit(write_png, frame_path(job.png, frame.time), frame.ldr)
+
+
+def field_of_view(camera: Camera) -> tuple[float, float] | None:
+    """Width and height of a camera's picture in degrees; None for an orthographic one."""
+    if camera.orthographic:
+        return None
+    left, right, bottom, top = camera.window
+    across = math.degrees(2.0 * math.atan((right - left) / 2.0))
+    return across, math.degrees(2.0 * math.atan((top - bottom) / 2.0))
 
 
 def exr_header(renderer: Renderer, frame: Frame) -> dict[str, Any]:
@@ -354,6 +382,12 @@ def exr_header(renderer: Renderer, frame: Frame) -> dict[str, Any]:
     }
     if math.isfinite(frame.time):  # the default time is no number
         header["hdrusd:frame"] = float(frame.time)
+    if frame.moment is not None and frame.moment.state is not None and renderer.viewing is not None:
+        seconds = renderer.seconds(frame.time)
+        number = frame.time if math.isfinite(frame.time) else 0.0
+        header["hdrusd:state"] = state_text(
+            renderer.viewing.operator, number, seconds, frame.moment.state
+        )
     if camera.exposure_scale is not None:
         header["hdrusd:exposureScale"] = float(camera.exposure_scale)
     return header

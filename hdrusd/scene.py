@@ -49,8 +49,9 @@ LIGHT = np.dtype(
         ("angle", "f8"),  # rad: half the angle that a distant light fills
         ("link", "i4"),  # 0: shines on everything; n: on draws with bit n - 1 in ``links``
         ("shadow", "i4"),  # 1: casts shadows
-        ("shadow_link", "i4"),  # 0: everything casts; n: draws with bit n - 1 in ``links``
+        ("shadow_link", "i4"),  # 0: everything casts; n: draws with bit n - 1 set
         ("key", "i8"),  # the same lamp over time has the same; told apart within a scene
+        ("sp", "f8"),  # scotopic over photopic light of the lamp; 0: as its colour has it
     ]
 )
 
@@ -153,6 +154,7 @@ class Material:
     clearcoat_roughness_map: TextureUse | None = None
     emission: RGB = (0.0, 0.0, 0.0)
     emission_map: TextureUse | None = None
+    emission_sp: float = 0.0  # S/P of the emission, as LIGHT.sp
     opacity: float = 1.0
     opacity_map: TextureUse | None = None
     opacity_threshold: float = 0.0
@@ -197,7 +199,8 @@ class Draw:
     transforms: Doubles  # (k, 4, 4), to world metres, row vectors
     double_sided: bool = False
     moving: bool = False  # its points or its places may change from frame to frame
-    links: int = 0  # bits of the light and shadow links that name it (LIGHT)
+    links: int = 0  # bits of the light links that name it (LIGHT.link)
+    shadow_links: int = 0  # bits of the shadow links that name it, in any number
     casts: bool = True  # whether it casts shadows
 
 

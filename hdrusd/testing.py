@@ -6,6 +6,8 @@ check_operator(MY_OPERATOR)
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +16,7 @@ import numpy.typing as npt
 from hdrusd.colour import luminance, with_luminance
 from hdrusd.gpu.context import create_context
 from hdrusd.gpu.evaluate import evaluate
-from hdrusd.tonemap.operator import Operator, Parameters, Statistics, statistics
+from hdrusd.tonemap.operator import Moment, Operator, Parameters, blurred, statistics
 
 #: cd/m2 of the sun's disc, the brightest thing that a scene shows.
 SUN = 1.6e9
@@ -23,6 +25,9 @@ SUN = 1.6e9
 #: closed formulas with pow, log2 and exp2 in float32, whose precision GLSL 3.30 leaves open;
 #: 1e-5 of white is a thirtieth of an 8-bit step in black.
 PARITY_RELATIVE, PARITY_ABSOLUTE = 1e-4, 1e-5
+
+#: Degrees that the frames are wide and high.
+FIELD = (40.0, 25.0)
 
 _CHROMATICITIES = (
     (1.0, 1.0, 1.0),
@@ -41,26 +46,45 @@ def check_operator(operator: Operator, ctx: Any = None, params: Parameters | Non
     ``ctx``: the OpenGL context to use; without one, one is made (ContextError).
     """
     ctx = create_context() if ctx is None else ctx
-    settings = operator.settings(params)
+    plain = operator.moment(params)
+    operator = operator.built(plain.parameters)
+    need = operator.needs(plain.parameters)
     scales = np.concatenate([[0.0], np.geomspace(1e-6, SUN, 400)])
     # (chromaticity, luminance, 3), float32 as a frame has it
     ramp = np.stack(
         [with_luminance(np.tile(c, (scales.size, 1)), scales) for c in _CHROMATICITIES]
     ).astype(np.float32)
     frames: dict[str, npt.NDArray[Any]] = {
-        "a night scene": np.geomspace(1e-3, 1e4, 1000)[:, None] * np.ones(3),
+        "a night scene": np.geomspace(1e-3, 1e4, 1000).reshape(25, 40, 1) * np.ones(3),
         "the sun in the picture": ramp,
-        "a black frame": np.zeros((4, 3)),
-        "one luminance": np.full((4, 3), 50.0),
+        "a black frame": np.zeros((4, 4, 3)),
+        "one luminance": np.full((4, 4, 3), 50.0),
     }
-    for frame, pixels in frames.items():
-        stats = statistics(pixels)
-        where = f"{operator.name}, statistics of {frame}"
-        mapped = operator.reference(ramp, stats, settings)
-        _check_range(mapped, ramp.shape, where)
-        if operator.tone_curve:
-            _check_rising(mapped, where)
-        _check_parity(operator, ctx, ramp.reshape(-1, 3), mapped.reshape(-1, 3), stats, settings)
+    moments = {
+        name: operator.steady(replace(plain, statistics=statistics(pixels, need, FIELD)))
+        for name, pixels in frames.items()
+    }
+    for name, moment in moments.items():
+        _check_moment(operator, ctx, ramp, moment, f"{operator.name}, statistics of {name}")
+    if operator.advance is None:
+        return
+    for before, earlier in moments.items():
+        for now, moment in moments.items():
+            for dt in (0.0, 0.1, 60.0):
+                state = operator.advance(earlier.state, moment, dt)
+                where = f"{operator.name}, {dt:g} s of {now} after {before}"
+                _check_moment(operator, ctx, ramp, replace(moment, state=state), where)
+                assert json.loads(json.dumps(state)) == state, f"{where}: state is not JSON's"
+
+
+def _check_moment(
+    operator: Operator, ctx: Any, ramp: npt.NDArray[Any], moment: Moment, where: str
+) -> None:
+    mapped = operator.apply(ramp, moment=moment)
+    _check_range(mapped, ramp.shape, where)
+    if operator.tone_curve:
+        _check_rising(mapped, where)
+    _check_parity(operator, ctx, ramp, mapped.reshape(-1, 3), moment, where)
 
 
 def _check_range(mapped: npt.NDArray[Any], shape: tuple[int, ...], where: str) -> None:
@@ -79,19 +103,32 @@ def _check_rising(mapped: npt.NDArray[Any], where: str) -> None:
 def _check_parity(
     operator: Operator,
     ctx: Any,
-    pixels: npt.NDArray[Any],
+    frame: npt.NDArray[Any],
     wanted: npt.NDArray[Any],
-    stats: Statistics,
-    settings: Parameters,
+    moment: Moment,
+    where: str,
 ) -> None:
-    uniforms = operator.uniforms(stats, settings)
+    pixels = frame.reshape(-1, 3)
+    arrays, call, defines = {"rgb": pixels}, "rgb", {}
+    if operator.blurs is not None:
+        around = blurred(frame, operator.blurs(moment.parameters)).reshape(len(pixels), -1)
+        count = around.shape[1]
+        defines = {"BLURS": count}
+        arrays |= {f"around_{i}": around[:, i] for i in range(count)}
+        call += f", float[BLURS]({', '.join(list(arrays)[1:])})"
     got = evaluate(
-        ctx, operator.glsl, operator.function, {"rgb": pixels}, "vec3", uniforms=uniforms
+        ctx,
+        operator.glsl,
+        f"{operator.function}({call})",
+        arrays,
+        "vec3",
+        uniforms=operator.uniforms(moment),
+        defines=defines,
     )
     wrong = ~(np.abs(got - wanted) <= PARITY_RELATIVE * np.abs(wanted) + PARITY_ABSOLUTE)
     if wrong.any():
         row = int(wrong.any(axis=1).argmax())
         raise AssertionError(
-            f"{operator.name}: {operator.glsl} gives {got[row]} for {pixels[row]} cd/m2, "
+            f"{where}: {operator.glsl} gives {got[row]} for {pixels[row]} cd/m2, "
             f"NumPy {wanted[row]}; {wrong.any(axis=1).sum()} of {len(pixels)} differ"
         )

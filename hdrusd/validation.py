@@ -152,11 +152,8 @@ _LIGHT_NUMBERS = {
     "exposure": _FINITE,
     "color": _NOT_NEGATIVE,
     "colorTemperature": _NOT_NEGATIVE,
-    "radius": _NOT_NEGATIVE,
-    "width": _NOT_NEGATIVE,
-    "height": _NOT_NEGATIVE,
-    "length": _NOT_NEGATIVE,
-    "angle": _NOT_NEGATIVE,
+    **dict.fromkeys(("radius", "width", "height", "length", "angle"), _NOT_NEGATIVE),
+    "photometric:scotopicPhotopicRatio": _POSITIVE,
     "photometric:luminousIntensity": _NOT_NEGATIVE,
     "photometric:illuminance": _NOT_NEGATIVE,
 }

@@ -21,7 +21,18 @@ DECISIONS = sorted((ROOT / "docs" / "decisions").glob("*.md"))
 FINDINGS = ROOT / "docs" / "findings.md"
 MAPPING = ROOT / "docs" / "concept-mapping.md"
 
-COMMANDS = {"convert", "render", "tonemap", "check", "info", "operators", "schemas", "doctor"}
+COMMANDS = {
+    "convert",
+    "render",
+    "tonemap",
+    "check",
+    "info",
+    "operators",
+    "observers",
+    "screens",
+    "schemas",
+    "doctor",
+}
 HEADINGS = ["Decision", "Why", "Alternatives", "Consequences"]
 
 #: A finding code: words joined by hyphens.

@@ -25,7 +25,7 @@ import hdrusd
 pytestmark = pytest.mark.product
 
 ROOT = Path(__file__).parents[1]
-DATA_SUFFIXES = {".glsl", ".vert", ".frag", ".usda"}
+DATA_SUFFIXES = {".glsl", ".vert", ".frag", ".usda", ".toml"}
 
 #: A white square of 2 m that faces +Z, with reflectance 0.5.
 PLANE_OBJ = """\
@@ -189,6 +189,8 @@ def test_version(product: Product) -> None:
 
 def test_operators_and_doctor(product: Product) -> None:
     assert "reinhard02" in product.succeed("operators")
+    assert "elderly" in product.succeed("observers")
+    assert "peak=1000 cd/m2" in product.succeed("screens", "hdr")
     done = product.run("doctor")
     if os.environ.get("HDRUSD_REQUIRE_GL"):
         assert done.returncode == 0, done.stdout + done.stderr

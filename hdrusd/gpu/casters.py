@@ -241,7 +241,7 @@ class Casters:
         return Cutout(use, uploaded.texture, channel, scale, bias, threshold)
 
     def _linked(self, draw: Draw) -> frozenset[int]:
-        return frozenset(n for n in self._links if draw.links >> (n - 1) & 1)
+        return frozenset(n for n in self._links if draw.shadow_links >> (n - 1) & 1)
 
     def _still(self, casters: Sequence[_Caster]) -> list[Group]:
         """Merged geometry by what shadow links and holes it has; and what is drawn often."""
@@ -385,7 +385,7 @@ def _same(known: Sequence[_Caster], casters: Sequence[_Caster]) -> bool:
     return len(known) == len(casters) and all(
         a.draw.geometry is b.draw.geometry
         and a.cutout == b.cutout
-        and a.draw.links == b.draw.links
+        and a.draw.shadow_links == b.draw.shadow_links
         and np.array_equal(a.draw.transforms, b.draw.transforms)
         for a, b in zip(known, casters, strict=True)
     )

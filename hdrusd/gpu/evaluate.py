@@ -14,8 +14,9 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.gpu.program import UniformValue, build, set_uniforms
+from hdrusd.gpu.program import UniformValue, build
 from hdrusd.gpu.source import Defines, from_text
+from hdrusd.gpu.tables import Tables
 
 _KINDS = {"f": ("float", "vec", "f4"), "i": ("int", "ivec", "i4"), "u": ("uint", "uvec", "u4")}
 _TYPES = {
@@ -65,8 +66,9 @@ def evaluate(
 ) -> Array | dict[str, Array]:
     """Run GLSL once per row.
 
-    ``include``: one or more files, as in an ``#include``. ``arrays``: inputs by name,
-    (n,) or (n, 2 to 4); floats go in as float32, integers as int or uint.
+    ``include``: one or more files, as in an ``#include``, or texts with line breaks.
+    ``arrays``: inputs by name, (n,) or (n, 2 to 4); floats go in as float32, integers as
+    int or uint.
     ``expression``: the name of a function, which gets the inputs in their order; or
     an expression over the input names. ``outputs``: its GLSL type, "float" or "vec3";
     the result is (n,) or (n, k). For several results, a mapping of names to types,
@@ -83,7 +85,8 @@ def evaluate(
     else:
         types = dict(outputs)
 
-    text = [f'#include "{name}"' for name in ([include] if isinstance(include, str) else include)]
+    includes = [include] if isinstance(include, str) else include
+    text = [name if "\n" in name else f'#include "{name}"' for name in includes]
     text += [f"in {_glsl_type(column)} {name};" for name, column in columns.items()]
     text += [
         f"{'' if _TYPES[kind][0] == 'f4' else 'flat '}out {kind} {name};"
@@ -96,6 +99,7 @@ def evaluate(
     buffers = {name: ctx.buffer(column) for name, column in columns.items()}
     layout = np.dtype([(name, *_TYPES[kind]) for name, kind in types.items()])
     captured = ctx.buffer(reserve=max(count, 1) * layout.itemsize)
+    tables = Tables(ctx)
     # An input that the expression does not read is not an attribute of the program.
     used = [name for name in columns if name in program]
     vertices = ctx.vertex_array(
@@ -103,7 +107,7 @@ def evaluate(
         [(buffers[n], f"{columns[n].shape[1]}{columns[n].dtype.kind}4", n) for n in used],
     )
     try:
-        set_uniforms(program, uniforms or {})
+        tables.use(program, uniforms or {}, 0)
         vertices.transform(captured, mode=moderngl.POINTS, vertices=count)
         rows = np.frombuffer(captured.read(), layout)[:count]
     finally:
@@ -111,6 +115,7 @@ def evaluate(
             buffer.release()
         vertices.release()
         program.release()
+        tables.release()
     results = {name: rows[name].copy() for name in types}
     return results["result"] if isinstance(outputs, str) else results
 

@@ -80,9 +80,9 @@ class LightPass:
         self.size = size
         self.scale = scale
         self._lists = LightLists()
-        # One vec4 is the place in the window. OpenGL 3.3 grants 16, most devices 32.
+        # Two vec4 are the place in the window and its ray. OpenGL 3.3 grants 16, most devices 32.
         names = ("GL_MAX_VERTEX_OUTPUT_COMPONENTS", "GL_MAX_FRAGMENT_INPUT_COMPONENTS")
-        self._varyings = min(int(ctx.info.get(name, 64)) for name in names) // 4 - 1
+        self._varyings = min(int(ctx.info.get(name, 64)) for name in names) // 4 - 2
         self._grid = (-(-size[0] // TILE), -(-size[1] // TILE))
         self._bounds = ctx.texture(self._grid, 4, dtype="f4")
         self._bounds_frame = ctx.framebuffer([self._bounds])
@@ -137,6 +137,7 @@ class LightPass:
                 if 2 & region.gloss:
                     names += ["COATED"] if "g_extra" in layers else []
                     names += ["DIELECTRIC"] if dielectric is not None else []
+                names += ["ORTHOGRAPHIC"] if scene.camera.orthographic else []
                 self._add_classes(table, region, names, uniforms, bind)
         finally:
             table.texture.release()

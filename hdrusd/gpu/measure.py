@@ -13,12 +13,14 @@ all that it holds. Chosen by time on llvmpipe (two 2.5 GHz cores) at 1280x720, b
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from hdrusd.eye.foveal import Foveal, default_field, foveal
 from hdrusd.gpu.program import Programs, set_uniforms
 from hdrusd.tonemap.operator import FLOOR, Need, Statistics, percentile_rank
 
@@ -41,13 +43,29 @@ class Measurer:
         )
         self._targets: dict[str, moderngl.Framebuffer] = {}
 
-    def measure(self, hdr: moderngl.Texture, need: Need = Need.PERCENTILES) -> Statistics | None:
+    def measure(
+        self,
+        hdr: moderngl.Texture,
+        need: Need = Need.PERCENTILES,
+        field: tuple[float, float] | None = None,
+        *,
+        top_first: bool = False,
+    ) -> Statistics | None:
         """Statistics of an RGB(A) float texture in cd/m2; None where nothing is needed.
 
-        NaN and negative channels count as 0, infinity as colour.BRIGHTEST.
+        NaN and negative channels count as 0, infinity as colour.BRIGHTEST. With FOVEAL the
+        averages are measured too; ``field`` is the frame's width and height in degrees (default:
+        eye.foveal.default_field). Row 0 is the bottom one unless ``top_first``.
         """
         if need == Need.NOTHING:
             return None
+        stats = self._luminances(hdr, Need.PERCENTILES in need)
+        if Need.FOVEAL not in need:
+            return stats
+        field = field or default_field(*hdr.size)
+        return replace(stats, foveal=_read_foveal(hdr, field, top_first))
+
+    def _luminances(self, hdr: moderngl.Texture, percentiles: bool) -> Statistics:
         width, height = hdr.size
         target = self._draw(
             hdr,
@@ -60,11 +78,11 @@ class Measurer:
         logs, number = counted[:, :2].sum(axis=0, dtype=np.float64)
         average = float(_read(target, 1, 1, "f4").sum(dtype=np.float64)) / (width * height)
         if number == 0:
-            percentile = FLOOR if need == Need.PERCENTILES else None
+            percentile = FLOOR if percentiles else None
             return Statistics(FLOOR, FLOOR, FLOOR, average, percentile, percentile)
         minimum, maximum = float(counted[:, 2].min()), float(counted[:, 3].max())
         p01 = p99 = None
-        if need == Need.PERCENTILES:
+        if percentiles:
             # The middle of a bin may lie past the extremes, which are exact.
             p01, p99 = (min(max(p, minimum), maximum) for p in self._percentiles(hdr, (1, 99)))
         return Statistics(math.exp2(logs / number), minimum, maximum, average, p01, p99)
@@ -114,3 +132,9 @@ def _read(
 ) -> npt.NDArray[Any]:
     data = target.read(components=components, attachment=attachment, dtype=dtype, alignment=1)
     return np.frombuffer(data, dtype)
+
+
+def _read_foveal(hdr: moderngl.Texture, field: tuple[float, float], top_first: bool) -> Foveal:
+    pixels = np.frombuffer(hdr.read(alignment=1), np.float32)
+    frame = pixels.reshape(hdr.height, hdr.width, -1)[..., :3]
+    return foveal(frame if top_first else frame[::-1], field)

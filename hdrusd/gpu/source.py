@@ -1,8 +1,9 @@
 """GLSL from package resources: ``#include``, ``#define``, and a table back to file and line.
 
 A name is a path from the root of the package ``hdrusd`` ("tonemap/reinhard02.glsl");
-other packages put theirs in front ("their_package:their_operator.glsl"). The table
-exists because drivers do not keep to ``#line``: Mesa 22.3 reports some errors against
+other packages put theirs in front ("their_package:their_operator.glsl"); with a line break
+in it, it is the text itself, whose first line is its name in messages. The table exists
+because drivers do not keep to ``#line``: Mesa 22.3 reports some errors against
 string 0 all the same.
 """
 
@@ -105,7 +106,8 @@ class _Joined:
                     circle = " -> ".join([*chain[chain.index(wanted) :], wanted])
                     raise ShaderError(f"{name}:{number}: #include goes in a circle: {circle}")
                 if wanted not in self.done:
-                    open_files.append((wanted, _numbered(_read(wanted, f"{name}:{number}"))))
+                    text = _read(wanted, f"{name}:{number}")
+                    open_files.append((wanted.partition("\n")[0], _numbered(text)))
 
     def _path(self, match: re.Match[str], place: str) -> str:
         path = match["path"]
@@ -126,6 +128,8 @@ def _numbered(text: str) -> Iterator[tuple[int, str]]:
 
 
 def _read(name: str, place: str) -> str:
+    if "\n" in name:
+        return name
     package, _, path = name.rpartition(":")
     parts = path.split("/")
     if not all(re.fullmatch(r"\w[\w.-]*", part) for part in parts):

@@ -118,6 +118,7 @@ class Interpreter:
             kind=kind,
             intensity=intensity,
             chromaticity=color,
+            sp=0.0 if rule is None else rule.sp,
             provenance=provenance,
             rule=name,
             source=source,
@@ -220,6 +221,9 @@ class Interpreter:
         if rule is not None and "candela" in rule.values:
             text = f"{rule.place} says candela; want illuminance"
             self._note(light, Kind.INVALID, "sidecar-unit", text)
+        if rule is not None and rule.sp:
+            text = f"{rule.place}: the S/P of the ambient light is not used; its colour tells"
+            self._note(light, Kind.DROPPED, "light-scotopic", text)
         color, strength = chromaticity(
             light.ambient if luminance(light.ambient) > 0.0 else light.diffuse
         )

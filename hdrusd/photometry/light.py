@@ -37,7 +37,8 @@ class PhotometricLight:
     plane for "distant" (on a horizontal plane under open sky for "ambient"). With a
     ``profile``, a photometric file as the stage names it, it is the factor on the
     file's candela.
-    ``chromaticity`` is linear Rec. 709 with a luminance of 1, so that their
+    ``sp`` is the ratio of its scotopic to its photopic light; 0: nobody has said, and its
+    colour tells. ``chromaticity`` is linear Rec. 709 with a luminance of 1, so that their
     product is the strength per channel.
     """
 
@@ -49,6 +50,7 @@ class PhotometricLight:
     exponent: float = 0.0  # of cos(angle to the axis)
     radius: float = 0.05  # m
     profile: str = ""
+    sp: float = 0.0
     provenance: Provenance = "estimated"
     rule: str = ""
     source: str = ""

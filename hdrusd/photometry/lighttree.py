@@ -35,8 +35,9 @@ _ONE_PLACE = 1e-6
 
 _AXES = (0, 1, 2)
 
-#: What has to be the same for two lamps to merge, beside the beam.
-_SAME = ("shape", "link", "shadow", "shadow_link", "diffuse", "specular")
+#: What has to be the same for two lamps to merge, beside the beam. What shades them has not:
+#: lamps with a shadow map don't merge.
+_SAME = ("shape", "link", "shadow", "diffuse", "specular")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,6 +6,8 @@
     [[light]]
     match = "Luminaire_*"       # shell pattern on the light's or its node's name
     candela = 3200
+    illuminant = "HP1"          # the lamp's kind of light (CIE), for its S/P; or sp_ratio = 0.6
+    fixture_shadow = true       # the mesh that it stands in shades it
     [[light]]
     match = "RoadLamp_*"
     ies = "road.ies"            # LM-63 or EULUMDAT, relative to this file
@@ -42,6 +44,7 @@ from typing import Any, get_args
 
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.photometry.light import Provenance
+from hdrusd.photometry.scotopic_light import ILLUMINANTS
 from hdrusd.report import Kind, Report
 
 #: The name under which it is looked for beside the source.
@@ -91,6 +94,9 @@ _KEYS: dict[str, dict[str, Any]] = {
         "axis": _DIRECTION,
         "c0": _DIRECTION,
         "radius": _Range(1e-3, 1e3),  # m
+        "sp_ratio": _Range(0.01, 100.0),
+        "illuminant": str,
+        "fixture_shadow": bool,
         "enabled": bool,
     },
     "material": _COMMON
@@ -125,7 +131,12 @@ _AMBIENT = {
 _COMPANIONS = {"scale": "ies", "lumens": "ies", "axis": "ies", "c0": "ies"}
 
 #: Of two keys that say one thing the first counts.
-_RIVALS = (("lumens", "scale"), ("ies", "candela"), ("roughness", "shininess"))
+_RIVALS = (
+    ("lumens", "scale"),
+    ("ies", "candela"),
+    ("sp_ratio", "illuminant"),
+    ("roughness", "shininess"),
+)
 
 
 @dataclass(slots=True)
@@ -152,6 +163,12 @@ class Rule:
         """A linear Rec. 709 colour or a direction, or None."""
         value = self.values.get(key)
         return None if value is None else (float(value[0]), float(value[1]), float(value[2]))
+
+    @property
+    def sp(self) -> float:
+        """The S/P of the lamp, stated or by its kind; 0 where the rule does not say."""
+        stated = self.number("sp_ratio")
+        return ILLUMINANTS.get(self.values.get("illuminant", ""), 0.0) if stated is None else stated
 
     @property
     def provenance(self) -> Provenance:
@@ -264,6 +281,8 @@ def _checked(
             _invalid(report, place, key, f"{_shown(value)}; want {_wanted(keys[key])}")
         elif key == "provenance" and value not in get_args(Provenance):
             _invalid(report, place, key, f"{_shown(value)}; want {', '.join(get_args(Provenance))}")
+        elif key == "illuminant" and value not in ILLUMINANTS:
+            _invalid(report, place, key, f"{_shown(value)}; want {', '.join(ILLUMINANTS)}")
         elif isinstance(keys[key], _Three) and keys[key].some and not any(value):
             _invalid(report, place, key, keys[key].some)
         else:

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.errors import HdrusdError
-from hdrusd.tonemap.falsecolour import falsecolour_palette
+from hdrusd.tonemap.falsecolour import falsecolour_palette, falsecolour_step
 
 Picture = npt.NDArray[np.uint8]
 
@@ -39,14 +39,21 @@ SMALLEST = (3 * _LINE, _BAR + _TICK + _LABEL + 4)
 
 
 def tick_luminances(scale: float, decades: float, divisions: int = 8) -> list[float]:
-    """cd/m2 at the ticks, from the bottom: scale 10^((k / divisions - 1) decades)."""
+    """cd/m2 at the ticks, from the bottom: scale 10^((k / divisions - 1) decades).
+
+    With no decades scale k / divisions.
+    """
+    if decades == 0.0:
+        return [scale * k / divisions for k in range(divisions + 1)]
     return [scale * 10.0 ** ((k / divisions - 1.0) * decades) for k in range(divisions + 1)]
 
 
-def paint_legend(picture: Picture, scale: float, decades: float) -> None:
+def paint_legend(
+    picture: Picture, scale: float, decades: float, palette: str = "spec", steps: float = 0.0
+) -> None:
     """Paint the scale into the left edge of ``picture`` (h, w, 3), top row first, in place.
 
-    ``scale`` and ``decades`` as in falsecolour.py. There are 8 divisions, or fewer
+    The other arguments as in falsecolour.py. There are 8 divisions, or fewer
     where the labels would touch. Raises HdrusdError for a picture below SMALLEST.
     """
     height, width = picture.shape[:2]
@@ -62,7 +69,7 @@ def paint_legend(picture: Picture, scale: float, decades: float) -> None:
     picture[:, : SMALLEST[1] * dot] = 0
     _write(picture, "cd/m2", dot, 2 * dot, dot)
     v = np.linspace(1.0, 0.0, bottom - top + 1)
-    bar = np.rint(falsecolour_palette(v) * 255.0).astype(np.uint8)
+    bar = np.rint(falsecolour_palette(falsecolour_step(v, steps), palette) * 255.0).astype(np.uint8)
     picture[top : bottom + 1, 2 * dot : (2 + _BAR) * dot] = bar[:, None]
     for k, value in enumerate(tick_luminances(scale, decades, divisions)):
         y = bottom - round(k * (bottom - top) / divisions)

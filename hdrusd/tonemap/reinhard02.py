@@ -10,6 +10,7 @@ Twin of reinhard02.glsl.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -18,14 +19,17 @@ from hdrusd.colour import luminance, to_gamut
 from hdrusd.errors import HdrusdError
 from hdrusd.tonemap.operator import (
     Array,
+    Moment,
     Need,
     Operator,
     Parameter,
     Parameters,
-    Statistics,
+    State,
+    Uniforms,
     measured,
     number,
 )
+from hdrusd.tonemap.smoothing import followed, remembered
 
 
 def reinhard02(rgb: npt.ArrayLike, scale: float, inverse_white2: float) -> Array:
@@ -60,9 +64,29 @@ def automatic_white(low: float, high: float) -> float:
     return 1.5 * math.exp2(math.log2(high) - math.log2(low) - 5.0)
 
 
-def _uniforms(stats: Statistics | None, params: Parameters) -> dict[str, float]:
-    stats = measured("reinhard02", stats)
-    key, white = params["key"], params["white"]
+def advance_average(state: State | None, moment: Moment, dt: float) -> State:
+    """The log average that the eye of this operator has after ``dt`` s of a frame."""
+    now = math.log(measured("reinhard02", moment.statistics).log_average)
+    if state is not None:
+        now = followed(remembered("reinhard02", state, "ln_average"), now, dt)
+    return {"ln_average": now}
+
+
+def adapted_average(moment: Moment) -> float:
+    """The log average, cd/m2, to scale a frame by: its state's, or else its own."""
+    if moment.state is None:
+        return measured("reinhard02", moment.statistics).log_average
+    return math.exp(remembered("reinhard02", moment.state, "ln_average"))
+
+
+def _trace(moment: Moment) -> Mapping[str, float]:
+    goal = measured("reinhard02", moment.statistics).log_average
+    return {"goal luminance [cd/m2]": goal, "adaptation [cd/m2]": adapted_average(moment)}
+
+
+def _uniforms(moment: Moment) -> dict[str, float]:
+    stats = measured("reinhard02", moment.statistics)
+    key, white = moment.parameters["key"], moment.parameters["white"]
     low = high = 0.0
     if "auto" in (key, white):
         if stats.p01 is None or stats.p99 is None:
@@ -70,7 +94,7 @@ def _uniforms(stats: Statistics | None, params: Parameters) -> dict[str, float]:
         low, high = stats.p01, stats.p99
     if key == "auto":
         key = automatic_key(stats.log_average, low, high)
-    scale = number("reinhard02", "key", key, 1e-6, 1e6) / stats.log_average
+    scale = number("reinhard02", "key", key, 1e-6, 1e6) / adapted_average(moment)
     if white == "auto":
         white = automatic_white(low, high)
     elif white is None:
@@ -80,8 +104,7 @@ def _uniforms(stats: Statistics | None, params: Parameters) -> dict[str, float]:
     return {"reinhard02_scale": scale, "reinhard02_inverse_white2": white**-2.0}
 
 
-def _reference(rgb: Array, stats: Statistics | None, params: Parameters) -> Array:
-    uniforms = _uniforms(stats, params)
+def _reference(rgb: Array, uniforms: Uniforms) -> Array:
     return reinhard02(rgb, uniforms["reinhard02_scale"], uniforms["reinhard02_inverse_white2"])
 
 
@@ -107,4 +130,6 @@ OPERATOR = Operator(
     function="reinhard02",
     uniforms=_uniforms,
     needs=_needs,
+    advance=advance_average,
+    trace=_trace,
 )

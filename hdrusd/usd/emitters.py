@@ -50,6 +50,7 @@ class _Glow:
 
     draws: tuple[Draw, ...]
     luminance: RGB
+    sp: float
     moving: bool
 
 
@@ -71,9 +72,11 @@ class Emitters:
         """Note rows of ``scene.LIGHT``; ``texture`` lies on rectangles, first pixel at +X +Y."""
         self._shown.append((rows, texture, moving))
 
-    def show_mesh(self, draws: Iterable[Draw], luminance: RGB, *, moving: bool = False) -> None:
-        """Note a mesh of this luminance, cd/m2."""
-        self._glows.append(_Glow(tuple(draws), luminance, moving))
+    def show_mesh(
+        self, draws: Iterable[Draw], luminance: RGB, *, sp: float = 0.0, moving: bool = False
+    ) -> None:
+        """Note a mesh of this luminance, cd/m2; ``sp`` as ``LIGHT.sp``."""
+        self._glows.append(_Glow(tuple(draws), luminance, sp, moving))
 
     def draws(
         self, first_material: int, profiles: tuple[Profile, ...]
@@ -87,11 +90,12 @@ class Emitters:
         # Still ones first: what moving ones add does not renumber their materials.
         for rows, texture, moving in sorted(self._shown, key=lambda shown: shown[2]):
             rows = rows[_seen(rows)]
-            alike = np.column_stack([rows["shape"], _luminance(rows, profiles)])
+            alike = np.column_stack([rows["shape"], rows["sp"], _luminance(rows, profiles)])
             kinds, which = np.unique(alike, axis=0, return_inverse=True)
             at = _places(rows)
-            for index, (shape, *luminance) in enumerate(kinds):
-                number = materials.setdefault(_material(luminance, texture), len(materials))
+            for index, (shape, sp, *luminance) in enumerate(kinds):
+                made = _material(luminance, texture, float(sp))
+                number = materials.setdefault(made, len(materials))
                 places.setdefault((int(shape), number, moving), []).append(at[which == index])
         kept, self._kept = self._kept, {}
         draws = [
@@ -100,7 +104,8 @@ class Emitters:
         ]
         glowed, self._glowing = self._glowing, {}
         for glow in self._glows:
-            number = materials.setdefault(_material(glow.luminance, None), len(materials))
+            made = _material(glow.luminance, None, glow.sp)
+            number = materials.setdefault(made, len(materials))
             for draw in glow.draws:
                 key = id(draw), first_material + number, glow.moving or draw.moving
                 draws.append(self._glow(glowed, key, draw))
@@ -157,13 +162,14 @@ def _on_axis(profiles: tuple[Profile, ...], number: int) -> float:
     return float(profile.candela[:, 0].mean() if nadir else profile.candela.max())
 
 
-def _material(luminance: Iterable[float], texture: TextureUse | None) -> Material:
+def _material(luminance: Iterable[float], texture: TextureUse | None, sp: float) -> Material:
     red, green, blue = (float(v) for v in luminance)
     dark = (0.0, 0.0, 0.0)
     if texture is None:
-        return Material(diffuse=dark, emission=(red, green, blue))
+        return Material(diffuse=dark, emission=(red, green, blue), emission_sp=sp)
     scaled = replace(texture, scale=(red, green, blue, 1.0))
-    return Material(diffuse=dark, emission=(red, green, blue), emission_map=scaled)
+    emission = red, green, blue
+    return Material(diffuse=dark, emission=emission, emission_map=scaled, emission_sp=sp)
 
 
 def _places(rows: Rows) -> Doubles:

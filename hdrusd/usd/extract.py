@@ -251,7 +251,10 @@ class StageReader:
                     self._finding(Kind.INVALID, "light-invalid", text, mesh.prim)
                     continue
                 self.links.assign(mesh.prim, rows)
-                self.emitters.show_mesh(mesh.draws(cache), mesh.luminance, moving=mesh.moving)
+                sp = float(rows["sp"][0])
+                self.emitters.show_mesh(
+                    mesh.draws(cache), mesh.luminance, sp=sp, moving=mesh.moving
+                )
                 yield rows
 
     def _shown(

@@ -155,7 +155,8 @@ class GprimReader:
     ) -> Iterator[Draw]:
         """One gprim at all its places, (k, 4, 4) in metres: a draw for each of its materials."""
         self._read_geometry(gprim, code)
-        links = self.links.bits(gprim.prim.GetPath()) if self.links is not None else 0
+        path = gprim.prim.GetPath()
+        links, shadow_links = (0, 0) if self.links is None else self.links.bits(path)
         for piece in gprim.pieces:
             if piece.geometry is not None:
                 yield Draw(
@@ -165,6 +166,7 @@ class GprimReader:
                     gprim.double_sided,
                     moving=moving,
                     links=links,
+                    shadow_links=shadow_links,
                 )
 
     def _read_geometry(self, gprim: Gprim, code: Usd.TimeCode) -> None:
@@ -204,7 +206,8 @@ def _merge(draws: list[Draw]) -> Iterable[Draw]:
     """One draw for all places of a geometry in one material: instances are drawn at once."""
     groups: dict[tuple[object, ...], list[Draw]] = {}
     for draw in draws:
-        key = (id(draw.geometry), draw.material, draw.double_sided, draw.links, draw.casts)
+        links = draw.links, draw.shadow_links
+        key = (id(draw.geometry), draw.material, draw.double_sided, *links, draw.casts)
         groups.setdefault(key, []).append(draw)
     for group in groups.values():
         if len(group) == 1:

@@ -21,7 +21,7 @@ from hdrusd.report import Kind, Report
 from hdrusd.scene import light_rows
 from hdrusd.units import LUMINANCE_WEIGHTS, distant_luminance, dome_luminance, sphere_luminance
 from hdrusd.usd.area import shape_row
-from hdrusd.usd.light_controls import light_key, read_controls
+from hdrusd.usd.light_controls import SP_RATIO, light_key, read_controls, scotopic_ratio
 from hdrusd.usd.lux import LuxReading, connection_end, input_number, photometric_file, read_lux
 
 #: Full angle of a distant light that we write: the sun's and the moon's, degrees.
@@ -68,6 +68,8 @@ def write_light(
     if not light.profile:
         name = _INTENSITY if light.kind in ("point", "spot") else _ILLUMINANCE
         prim.CreateAttribute(name, Sdf.ValueTypeNames.Float, False).Set(light.intensity)
+    if light.sp:
+        prim.CreateAttribute(f"inputs:{SP_RATIO}", Sdf.ValueTypeNames.Float, False).Set(light.sp)
     _uniform(prim, "photometric:provenance", Sdf.ValueTypeNames.Token, light.provenance)
     if light.rule:
         _uniform(prim, "photometric:rule", Sdf.ValueTypeNames.String, light.rule)
@@ -115,6 +117,7 @@ def read_light(prim: Usd.Prim, *, scale: float = 1.0) -> PhotometricLight:
         exponent=exponent,
         radius=reading.radius or 0.05,
         profile=photometric_file(prim),
+        sp=scotopic_ratio(prim, Usd.TimeCode.Default()),
         provenance=get("photometric:provenance") or "authored",  # type: ignore[arg-type]
         rule=get("photometric:rule"),
         source=get("photometric:source"),
@@ -212,6 +215,9 @@ def _note_unused(prim: Usd.Prim, time: Usd.TimeCode, report: Report) -> None:
         if input_number(prim, name, time) != 1.0:
             text = f"inputs:{name} of a dome is not used"
             _finding(report, prim, "light-multiplier", text)
+    if scotopic_ratio(prim, time) != 0.0:
+        text = f"inputs:{SP_RATIO} of a dome is not used; its colour tells"
+        _finding(report, prim, "light-scotopic", text)
     if any(p.GetName().startswith("collection:") for p in prim.GetAuthoredProperties()):
         _finding(report, prim, "light-linking", "a dome lights everything")
 

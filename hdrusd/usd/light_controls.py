@@ -1,4 +1,4 @@
-"""What a light is told beside its strength and shape: multipliers, shadows, filters; its key."""
+"""What a light is told beside strength and shape: multipliers, S/P, shadows, filters; its key."""
 
 from __future__ import annotations
 
@@ -23,6 +23,13 @@ _SHADOW_INPUTS: dict[str, Any] = {
 }
 
 
+#: Scotopic over photopic light of the lamp.
+SP_RATIO = "photometric:scotopicPhotopicRatio"
+
+#: No light has more: the most is 72, at 410 nm (CIE 1951 V' over CIE 1924 V).
+_MOST_BLUE = 100.0
+
+
 def light_key(prim: Usd.Prim) -> int:
     """A number of the light by its path, the same in every frame and run."""
     digest = hashlib.blake2b(str(prim.GetPath()).encode(), digest_size=8).digest()
@@ -35,10 +42,16 @@ def casts_shadows(prim: Usd.Prim, time: Usd.TimeCode) -> bool:
     return not (source and source.Get(time) is False)
 
 
+def scotopic_ratio(prim: Usd.Prim, time: Usd.TimeCode) -> float:
+    """The S/P that a light states, whatever it is; 0 where it states none."""
+    source = input_source(prim, SP_RATIO)
+    return input_number(prim, SP_RATIO, time) if source and source.HasAuthoredValue() else 0.0
+
+
 def read_controls(
     prim: Usd.Prim, time: Usd.TimeCode, rows: npt.NDArray[np.void], report: Report
 ) -> None:
-    """Fill ``diffuse``, ``specular`` and ``shadow`` of rows of ``scene.LIGHT``."""
+    """Fill ``diffuse``, ``specular``, ``sp`` and ``shadow`` of rows of ``scene.LIGHT``."""
 
     def finding(kind: Kind, code: str, text: str) -> None:
         place = SourceRef(Path(prim.GetStage().GetRootLayer().identifier))
@@ -50,6 +63,12 @@ def read_controls(
             text = f"inputs:{name} {factor:g}; read as 0"
             finding(Kind.CLAMPED, "light-multiplier", text)
         rows[name] = np.maximum(factor, 0.0)  # NaN stays, and the light is left out
+    ratio = scotopic_ratio(prim, time)
+    if 0.0 < ratio <= _MOST_BLUE:
+        rows["sp"] = ratio
+    elif ratio != 0.0:
+        text = f"inputs:{SP_RATIO} {ratio:g}; want above 0, at most {_MOST_BLUE:g}; not used"
+        finding(Kind.INVALID, "light-scotopic", text)
     if prim.HasAPI(UsdLux.ShadowAPI):
         rows["shadow"] = casts_shadows(prim, time)
         for name, neutral in _SHADOW_INPUTS.items():

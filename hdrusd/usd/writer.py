@@ -8,7 +8,7 @@ street.geometry.usdc     nodes, meshes, cameras, bindings, animation
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from hdrusd.legacy import scene as legacy
 from hdrusd.photometry.light import PhotometricLight
 from hdrusd.report import Report
 from hdrusd.usd.camera import write_camera
+from hdrusd.usd.fixtures import Lamp, PlacedMesh, find_fixtures, free_from
 from hdrusd.usd.light import write_legacy_falloff, write_light
 from hdrusd.usd.material import bind, bind_faces, keep_extras
 from hdrusd.usd.mesh import write_mesh
@@ -87,6 +88,7 @@ class StageWriter:
         top = Sdf.Path.absoluteRootPath
         self.names = Names({top: {"Render", _PROTOTYPES.name}})
         self.places: list[Place] = []
+        self.meshes: list[PlacedMesh] = []
         self.end: float | None = None
         self.first_camera: str | None = None
         root = Sdf.Layer.CreateNew(str(folder / f"{stem}.usda"))
@@ -164,6 +166,7 @@ class StageWriter:
         for index in node.meshes:
             mesh = self.scene.meshes[index]
             child = self.names.child(path, mesh.name)
+            self.meshes.append(PlacedMesh(child, path, index))
             if uses[index] > 1:
                 self._instance(child, index)
             else:
@@ -300,6 +303,13 @@ class StageWriter:
             form.AddTranslateOp().Set(Gf.Vec3d(*source.position))
         if turn is not None and source.kind != "ambient":
             form.AddOrientOp(UsdGeom.XformOp.PrecisionDouble).Set(Gf.Quatd(turn))
+
+    def free_lamps(self, lamps: Sequence[Lamp]) -> None:
+        """Find the fixtures of lamps, and leave them out of their shadows."""
+        self._edit("photometry")
+        find_fixtures(self.stage, self.scene, self.meshes, lamps)
+        for lamp in lamps:
+            free_from(lamp.prim, lamp.fixtures)
 
     def write_ambient(self, light: PhotometricLight) -> Usd.Prim:
         """The sky: AmbientAPI on the default prim, and a dome that says the same to others."""

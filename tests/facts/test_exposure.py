@@ -93,4 +93,4 @@ def test_senseless_parameter(params: dict) -> None:
 
 def test_automatic_exposure_without_statistics() -> None:
     with pytest.raises(HdrusdError, match="statistics"):
-        OPERATOR.reference(np.ones((1, 1, 3)), None, OPERATOR.settings())
+        OPERATOR.uniforms(OPERATOR.moment())

@@ -9,7 +9,12 @@ from hypothesis import strategies as st
 
 from hdrusd.colour import srgb_encode
 from hdrusd.errors import HdrusdError
-from hdrusd.tonemap.falsecolour import OPERATOR, falsecolour_palette, falsecolour_position
+from hdrusd.tonemap.falsecolour import (
+    OPERATOR,
+    falsecolour_palette,
+    falsecolour_position,
+    falsecolour_step,
+)
 from hdrusd.tonemap.legend import SMALLEST, paint_legend, tick_luminances
 
 
@@ -25,6 +30,43 @@ def test_palette() -> None:
     got = falsecolour_palette([0.0, 0.1875, 0.375, 0.6875, 1.0])
     wanted = [[0, 0, 1], [0, 0.5, 0.5], [0, 1, 0], [0.5, 0.5, 0], [1, 0, 0]]
     np.testing.assert_allclose(got, wanted, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("palette", "v", "wanted"),
+    # pm3d (sqrt v, v^3, sin 2 pi v); hot (3v, 3v - 1, 3v - 2); eco (2v, 2v - 1, 1 - 2v); clipped.
+    [
+        ("pm3d", 0.0, (0.0, 0.0, 0.0)),
+        ("pm3d", 0.25, (0.5, 0.015625, 1.0)),
+        ("pm3d", 1.0, (1.0, 1.0, 0.0)),
+        ("hot", 0.5, (1.0, 0.5, 0.0)),
+        ("hot", 0.75, (1.0, 1.0, 0.25)),
+        ("eco", 0.25, (0.5, 0.0, 0.5)),
+        ("eco", 0.75, (1.0, 0.5, 0.0)),
+    ],
+)
+def test_other_palettes(palette: str, v: float, wanted: tuple) -> None:
+    np.testing.assert_allclose(falsecolour_palette(v, palette), wanted, rtol=0, atol=1e-15)
+
+
+def test_linear_scale() -> None:
+    got = falsecolour_position([0.0, 250.0, 1000.0, 4000.0], 1000.0, 0.0)
+    np.testing.assert_allclose(got, [0.0, 0.25, 1.0, 1.0], rtol=1e-15)
+    assert tick_luminances(1000.0, 0.0)[1:3] == [125.0, 250.0]
+
+
+def test_steps() -> None:
+    # (floor(8 v) + 0.5) / 8; the very top belongs to the highest step.
+    got = falsecolour_step([0.0, 0.124, 0.125, 0.99, 1.0], 8.0)
+    np.testing.assert_allclose(got, [0.0625, 0.0625, 0.1875, 0.9375, 0.9375], rtol=1e-15)
+
+
+def test_legend_has_the_palette_and_the_steps_of_the_picture() -> None:
+    picture = np.zeros((270, 480, 3), np.uint8)
+    paint_legend(picture, 1000.0, 0.0, "hot", 3.0)
+    colours = {tuple(int(c) for c in row) for row in picture[12:-5, 4]}
+    # 1/6, 1/2 and 5/6 of the scale: (3v, 3v - 1, 3v - 2) x 255, rounded.
+    assert colours == {(128, 0, 0), (255, 128, 0), (255, 255, 128)}
 
 
 def test_picture_shows_the_palette() -> None:
@@ -93,7 +135,10 @@ def test_legend_on_too_small_a_picture() -> None:
         paint_legend(np.zeros((20, 10, 3), np.uint8), 1000.0, 3.0)
 
 
-@pytest.mark.parametrize("params", [{"decades": 0.0}, {"scale": -1.0}, {"scale": "wide"}])
+@pytest.mark.parametrize(
+    "params",
+    [{"decades": 0.0}, {"scale": -1.0}, {"scale": "wide"}, {"palette": "jet"}, {"steps": 1.0}],
+)
 def test_senseless_parameter(params: dict) -> None:
     with pytest.raises(HdrusdError, match="want"):
         OPERATOR.apply(np.ones((1, 1, 3)), None, params)

@@ -24,6 +24,7 @@ candela = 3200
 illuminance = 2
 temperature = 2000
 color = [1.0, 0.5, 0.1]
+sp_ratio = 0.62
 radius = 0.1
 enabled = true
 source = "data sheet"
@@ -32,6 +33,7 @@ provenance = "measured"
 match = "Road_*"
 ies = "road.ies"
 lumens = 5600
+illuminant = "HP1"
 axis = [0, 0.1, -1]
 c0 = [-1, 0, 0]
 [[material]]
@@ -76,6 +78,7 @@ def test_every_key_is_known(tmp_path: Path) -> None:
     assert light.number("candela") == 3200.0
     assert light.three("color") == (1.0, 0.5, 0.1)
     assert light.number("radius") == 0.1
+    assert light.sp == 0.62
     assert light.values["enabled"] is True
     road = sidecar.match("light", "Road_1")
     assert road is not None

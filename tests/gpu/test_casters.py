@@ -98,8 +98,8 @@ def test_what_is_far_off_leaves_the_shadows_alone(
 @pytest.mark.parametrize("moving", [False, True])
 def test_shadow_links(gl: Any, moving: bool) -> None:
     """The second lamp's shadows are of the second roof alone."""
-    first = draw(plane(0.3, 1.3, "first"), links=0b01, moving=moving)
-    second = draw(ROOF, 0, move(2, 0, 0), links=0b10, moving=moving)
+    first = draw(plane(0.3, 1.3, "first"), shadow_links=0b01, moving=moving)
+    second = draw(ROOF, 0, move(2, 0, 0), shadow_links=0b10, moving=moving)
     lamps = [LAMP | {"shadow_link": link} for link in (0, 1, 2)]
     shown = scene(lamps, FLOOR, first, second)
     places = [(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)]

@@ -15,6 +15,8 @@ from hdrusd.gpu.program import Programs
 from hdrusd.tonemap.operator import OPERATORS, Operator, statistics
 
 REINHARD = OPERATORS["reinhard02"]
+CAMERA = OPERATORS["exposure"]
+FALSE = OPERATORS["falsecolour"]
 
 
 @pytest.fixture
@@ -39,7 +41,7 @@ def expected(rgb: np.ndarray, operator: Operator) -> np.ndarray:
 def test_picture_is_the_reference(mapper: ToneMapper, name: str) -> None:
     rgb = night(90, 160)
     operator = OPERATORS[name]
-    got = mapper.apply_array(rgb, operator, None, statistics(rgb))
+    got = mapper.apply_array(rgb, operator, operator.moment(None, statistics(rgb)))
     assert got.shape == (90, 160, 3)
     assert got.dtype == np.uint8
     assert got.flags.c_contiguous
@@ -55,7 +57,7 @@ def test_every_pixel_is_in_its_place(mapper: ToneMapper, width: int) -> None:
     # Bytes are packed across pixels; linear light that 8 bits hold comes out exactly.
     codes = np.random.default_rng(width).integers(0, 256, (7, width, 3))
     linear = np.where(codes > 10, ((codes / 255 + 0.055) / 1.055) ** 2.4, codes / 255 / 12.92)
-    got = mapper.apply_array(linear.astype(np.float32), OPERATORS["exposure"], {"scale": 1.0})
+    got = mapper.apply_array(linear.astype(np.float32), CAMERA, CAMERA.moment({"scale": 1.0}))
     assert np.abs(got.astype(int) - codes).max() <= 1
     assert (got != codes).mean() < 0.11
 
@@ -66,21 +68,21 @@ def test_texture_has_its_bottom_row_first(mapper: ToneMapper, gl: Any) -> None:
     texture = gl.texture((20, 12), 4, np.ascontiguousarray(rgba[::-1]), dtype="f4")
     stats = statistics(rgb)
     np.testing.assert_array_equal(
-        mapper.apply(texture, REINHARD, None, stats),
-        mapper.apply_array(rgb, REINHARD, None, stats),
+        mapper.apply(texture, REINHARD, REINHARD.moment(None, stats)),
+        mapper.apply_array(rgb, REINHARD, REINHARD.moment(None, stats)),
     )
 
 
 def test_broken_pixels_do_not_spread(mapper: ToneMapper) -> None:
     rgb = night(16, 32)
     stats = statistics(rgb)
-    whole = mapper.apply_array(rgb, REINHARD, None, stats)
+    whole = mapper.apply_array(rgb, REINHARD, REINHARD.moment(None, stats))
     broken = rgb.copy()
     broken[4, 4] = np.nan
     broken[5, 9] = -3.0
     broken[6, 14] = -np.inf
     broken[7, 19] = np.inf
-    got = mapper.apply_array(broken, REINHARD, None, stats)
+    got = mapper.apply_array(broken, REINHARD, REINHARD.moment(None, stats))
     places = [4, 5, 6, 7], [4, 9, 14, 19]
     assert got[places].tolist() == [[0] * 3, [0] * 3, [0] * 3, [255] * 3]
     got[places] = whole[places]
@@ -90,7 +92,7 @@ def test_broken_pixels_do_not_spread(mapper: ToneMapper) -> None:
 def test_one_broken_channel_leaves_the_others(mapper: ToneMapper) -> None:
     rgb = np.full((4, 4, 3), 0.25, np.float32)
     rgb[..., 1] = np.nan
-    got = mapper.apply_array(rgb, OPERATORS["exposure"], {"scale": 1.0})
+    got = mapper.apply_array(rgb, CAMERA, CAMERA.moment({"scale": 1.0}))
     assert not got[..., 1].any()
     # sRGB of 0.25 is 0.5371, 137 of 255.
     assert abs(got[..., 0].mean() - 136.96) < 0.6
@@ -99,7 +101,7 @@ def test_one_broken_channel_leaves_the_others(mapper: ToneMapper) -> None:
 def test_black_is_black_and_white_is_white(mapper: ToneMapper) -> None:
     rgb = np.zeros((64, 64, 3), np.float32)
     rgb[:, 32:] = 1000.0
-    got = mapper.apply_array(rgb, REINHARD, None, statistics(rgb))
+    got = mapper.apply_array(rgb, REINHARD, REINHARD.moment(None, statistics(rgb)))
     assert not got[:, :32].any()
     assert (got[:, 32:] == 255).all()
 
@@ -107,18 +109,18 @@ def test_black_is_black_and_white_is_white(mapper: ToneMapper) -> None:
 def test_sizes_change(mapper: ToneMapper) -> None:
     for size in ((4, 4), (9, 33), (4, 4)):
         rgb = night(*size)
-        got = mapper.apply_array(rgb, REINHARD, None, statistics(rgb))
+        got = mapper.apply_array(rgb, REINHARD, REINHARD.moment(None, statistics(rgb)))
         assert np.abs(got.astype(int) - expected(rgb, REINHARD)).max() <= 1
 
 
 def test_operator_without_its_statistics(mapper: ToneMapper) -> None:
     with pytest.raises(HdrusdError, match="reinhard02: no statistics"):
-        mapper.apply_array(night(2, 2), REINHARD)
+        mapper.apply_array(night(2, 2), REINHARD, REINHARD.moment())
     with pytest.raises(UnknownNameError, match="kay"):
-        mapper.apply_array(night(2, 2), REINHARD, {"kay": 1.0})
+        REINHARD.moment({"kay": 1.0})
 
 
 def test_context_is_left_as_it_was(mapper: ToneMapper, gl: Any) -> None:
-    mapper.apply_array(night(4, 4), OPERATORS["falsecolour"])
+    mapper.apply_array(night(4, 4), FALSE, FALSE.moment())
     # The resting framebuffer is bound again: without one this would be an OpenGL error.
     assert evaluate(gl, [], "x * 2.0", {"x": [1.0]}, "float").tolist() == [2.0]

@@ -17,7 +17,11 @@ LDR = ("gpu/shaders/fullscreen.vert", "gpu/shaders/ldr.frag")
 
 
 def variant(operator: str) -> dict[str, str]:
-    return {"OPERATOR": operator, "OPERATOR_GLSL": f'"tonemap/{operator}.glsl"'}
+    return {
+        "OPERATOR": operator,
+        "ENCODE": "encode_srgb",
+        "OPERATOR_GLSL": f'"tonemap/{operator}.glsl"',
+    }
 
 
 def test_same_program_for_the_same_files_and_defines(gl: Any) -> None:

@@ -24,6 +24,24 @@ VARIANTS = [
     ("exposure", {"ev100": -4.0}),
     ("exposure", {"scale": 0.02}),
     ("falsecolour", {"scale": 10.0, "decades": 2.0}),
+    ("falsecolour", {"palette": "pm3d", "decades": None}),
+    ("falsecolour", {"palette": "hot", "steps": 8.0}),
+    ("falsecolour", {"palette": "eco", "steps": 3.0}),
+    ("drago03", {"bias": 0.5}),
+    ("drago03", {"bias": 1.0}),
+    ("ferwerda96", {"rods": "walraven"}),
+    ("pbr_neutral", {"ev100": -3.0}),
+    ("pbr_neutral", {"scale": 1e12}),
+    ("aces", {"fit": "narkowicz", "ev100": -3.0}),
+    ("aces", {"fit": "hill", "scale": 1e12}),
+    ("agx", {"ev100": 2.0}),
+    ("agx", {"scale": 1e12}),
+    ("absolute", {"above": "rolloff"}),
+    ("absolute", {"above": "rolloff", "source": 1000.0}),
+    ("reinhard02_local", {"key": 0.5, "phi": 10.0, "eps": 0.01, "white": 3.0}),
+    ("irawan05", {"weights": "gaze", "smoothing": 0.0}),
+    ("irawan05", {"weights": "centre", "exponent": 0.7}),
+    ("pattanaik00", {"rods": "paper"}),
 ]
 
 
@@ -67,12 +85,12 @@ def test_falsecolour_parts(gl: Any) -> None:
 
 
 BROKEN = {
-    "too bright": (lambda rgb, s, p: REINHARD.reference(rgb, s, p) * 1.01, r"want \[0, 1\]"),
-    "below black": (lambda rgb, s, p: REINHARD.reference(rgb, s, p) - 0.01, r"want \[0, 1\]"),
-    "NaN": (lambda rgb, s, p: np.where(rgb > 1e9, np.nan, 0.5), "NaN"),
-    "falling": (lambda rgb, s, p: 1.0 / (1.0 + rgb), "more light in and less out"),
-    "not the shader": (lambda rgb, s, p: REINHARD.reference(rgb, s, p) ** 1.001, "differ"),
-    "one pixel less": (lambda rgb, s, p: REINHARD.reference(rgb, s, p)[1:], "shape"),
+    "too bright": (lambda rgb, u: REINHARD.reference(rgb, u) * 1.01, r"want \[0, 1\]"),
+    "below black": (lambda rgb, u: REINHARD.reference(rgb, u) - 0.01, r"want \[0, 1\]"),
+    "NaN": (lambda rgb, u: np.where(rgb > 1e9, np.nan, 0.5), "NaN"),
+    "falling": (lambda rgb, u: 1.0 / (1.0 + rgb), "more light in and less out"),
+    "not the shader": (lambda rgb, u: REINHARD.reference(rgb, u) ** 1.001, "differ"),
+    "one pixel less": (lambda rgb, u: REINHARD.reference(rgb, u)[1:], "shape"),
 }
 
 

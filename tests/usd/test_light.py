@@ -39,6 +39,7 @@ COLORS = st.tuples(*[st.floats(1e-3, 10.0)] * 3).map(lambda color: chromaticity(
 COMMON = {
     "intensity": f32(2.0**-20, 2.0**40),
     "chromaticity": COLORS,
+    "sp": st.one_of(st.just(0.0), f32(2.0**-10, 60.0)),
     "provenance": st.sampled_from(["measured", "authored", "estimated"]),
     "rule": st.sampled_from(["", "night-20lx", "photometry.toml:light[1]"]),
     "source": st.sampled_from(["", 'Datenblatt für 7012 lm, "TST-604"\n2nd line']),
@@ -79,9 +80,9 @@ def written(light: PhotometricLight, unit: float, scale: float) -> tuple[Usd.Pri
 def test_what_is_written_is_read(light: PhotometricLight, unit: float, scale: float) -> None:
     prim, metres = written(light, unit, scale)
     back = read_light(prim, scale=metres)
-    for name in ("kind", "cutoff", "softness", "exponent", "profile", "provenance", "rule"):
+    names = ("kind", "cutoff", "softness", "exponent", "profile", "sp", "provenance", "rule")
+    for name in (*names, "source"):
         assert getattr(back, name) == getattr(light, name), name
-    assert back.source == light.source
     # Only beside a file does the strength pass through nits: six roundings, radius squared.
     assert back.intensity == pytest.approx(light.intensity, rel=6 * ULP if light.profile else 0.0)
     # Three channels rounded once; the luminance that is divided out sees all three.

@@ -24,7 +24,7 @@ def street(lamps: int = 1) -> tuple[Usd.Stage, list[UsdLux.LightAPI]]:
     return stage, [UsdLux.LightAPI(light) for light in lights]
 
 
-def bits(links: Links, *paths: str) -> list[int]:
+def bits(links: Links, *paths: str) -> list[tuple[int, int]]:
     return [links.bits(Sdf.Path(path)) for path in paths]
 
 
@@ -46,12 +46,12 @@ def test_bits_are_those_of_usd_s_membership() -> None:
     two.GetShadowLinkCollectionAPI().ExcludePath("/House")
     links = Links(stage, Report())
     assert links.note(one.GetPrim()) == (1, 0)
-    assert links.note(two.GetPrim()) == (0, 2)
-    assert bits(links, "/Car/Body", "/Car/Glass", "/House") == [3, 2, 0]
+    assert links.note(two.GetPrim()) == (0, 1)
+    assert bits(links, "/Car/Body", "/Car/Glass", "/House") == [(1, 1), (0, 1), (0, 0)]
     rows = light_rows(3)
     links.assign(two.GetPrim(), rows)
     assert rows["link"].tolist() == [0, 0, 0]
-    assert rows["shadow_link"].tolist() == [2, 2, 2]
+    assert rows["shadow_link"].tolist() == [1, 1, 1]
 
 
 def test_links_that_say_the_same_share_a_number() -> None:
@@ -71,7 +71,41 @@ def test_there_are_as_many_links_as_a_float_holds_bits() -> None:
     numbers = [links.note(lamp.GetPrim())[0] for lamp in lamps]
     assert numbers == [*range(1, MOST_LINKS + 1), 0, 0]
     assert [f.code for f in report] == ["light-linking"] * 2
-    assert links.bits(Sdf.Path("/Thing0")) == 2**MOST_LINKS - 2
+    assert links.bits(Sdf.Path("/Thing0")) == (2**MOST_LINKS - 2, 0)
+
+
+def test_any_lamp_may_leave_out_its_own_pole() -> None:
+    stage, lamps = street(100)
+    for index, lamp in enumerate(lamps):
+        lamp.GetShadowLinkCollectionAPI().ExcludePath(f"/Pole{index}")
+    report = Report()
+    links = Links(stage, report)
+    assert [links.note(lamp.GetPrim())[1] for lamp in lamps] == [*range(1, 101)]
+    assert bits(links, "/Pole7/Mesh", "/Pole") == [(0, 2**100 - 1 - 2**7), (0, 2**100 - 1)]
+    assert not report
+
+
+def test_an_include_inside_an_exclude() -> None:
+    stage, (lamp,) = street()
+    shade = lamp.GetShadowLinkCollectionAPI()
+    shade.ExcludePath("/Car")
+    shade.IncludePath("/Car/Glass")
+    links = Links(stage, Report())
+    assert links.note(lamp.GetPrim()) == (0, 1)
+    assert bits(links, "/Car/Body", "/Car/Glass", "/House") == [(0, 0), (0, 1), (0, 1)]
+
+
+def test_shadow_links_that_need_a_query_are_few() -> None:
+    stage, lamps = street(MOST_LINKS + 1)
+    for index, lamp in enumerate(lamps):
+        shade = lamp.GetShadowLinkCollectionAPI()
+        shade.CreateIncludeRootAttr(False)
+        shade.IncludePath(f"/Thing{index}")
+    report = Report()
+    links = Links(stage, report)
+    numbers = [links.note(lamp.GetPrim())[1] for lamp in lamps]
+    assert numbers == [*range(1, MOST_LINKS + 1), 0]
+    assert [f.code for f in report] == ["light-linking"]
 
 
 def test_expressions() -> None:
@@ -81,7 +115,7 @@ def test_expressions() -> None:
     collection.CreateMembershipExpressionAttr().Set(Sdf.PathExpression("//Glass"))
     links = Links(stage, Report())
     assert links.note(lamp.GetPrim()) == (1, 0)
-    assert bits(links, "/Car/Glass", "/Car/Body") == [1, 0]
+    assert bits(links, "/Car/Glass", "/Car/Body") == [(1, 0), (0, 0)]
 
 
 def test_a_scene_has_links_on_lights_and_surfaces() -> None:

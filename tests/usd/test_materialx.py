@@ -11,7 +11,7 @@ import pytest
 from looks import fed, network, node, shown
 from pxr import Sdf, Usd
 
-from hdrusd.render import open_stage
+from hdrusd.usd.opening import open_stage
 from hdrusd.report import Report
 from hdrusd.scene import Material, TextureUse
 

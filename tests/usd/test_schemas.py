@@ -20,6 +20,7 @@ CONTRACT = {
     "HdrusdPhotometricLightAPI": {
         "inputs:photometric:luminousIntensity": ("float", False, "cd"),
         "inputs:photometric:illuminance": ("float", False, "lx"),
+        "inputs:photometric:scotopicPhotopicRatio": ("float", False, "1"),
         "photometric:provenance": ("token", True, None),
         "photometric:rule": ("string", True, None),
         "photometric:source": ("string", True, None),

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from hdrusd.errors import InputError
-from hdrusd.render import open_stage
+from hdrusd.usd.opening import open_stage
 
 STAGE = """#usda 1.0
 def Xform "Car" (

@@ -1,22 +1,14 @@
-// Shader 2: HDR frame in cd/m2 to the bytes of an 8-bit sRGB picture, by any operator.
+// Shader 2: HDR frame in cd/m2 to the bytes of an 8-bit picture, by any operator.
 // An RGBA32UI texel holds 16 consecutive bytes of the RGB picture, so three of them hold 16
 // pixels: nothing is left to convert or to drop when it is read (why: gpu/ldr.py).
-#include "colour.glsl"
-#include OPERATOR_GLSL
-
-uniform sampler2D hdr;        // cd/m2, nearest
-uniform vec2 texel;           // 1 / size of hdr
-uniform int top_row, row_step;  // row of hdr at the top of the picture, and +1 or -1
+#include "gpu/shaders/shown.glsl"
 
 layout(location = 0) out uvec4 bytes;
 
 // The pixel x to the right and y down: red in the lowest byte, then green and blue.
 uint pixel(ivec2 p)
 {
-    // By coordinates: a texel fetch is checked against the size, which costs a fifth on llvmpipe.
-    vec2 place = (vec2(p.x, top_row + row_step * p.y) + 0.5) * texel;
-    vec3 rgb = OPERATOR(clean(textureLod(hdr, place, 0.0).rgb));
-    uvec3 code = quantise(srgb_encode_fit(rgb), dither(uint(p.x), uint(p.y)));
+    uvec3 code = quantise(shown(p), dither(uint(p.x), uint(p.y)));
     return code.r | code.g << 8 | code.b << 16;
 }
 

@@ -3,9 +3,17 @@
 #include "photometry/light.glsl"
 #include "photometry/reflectance.glsl"
 #include "photometry/microfacet.glsl"
-#include "gpu/shaders/gbuffer.glsl"
 
-in vec2 window;
+uniform sampler2D g_normal;    // unit normal; distance along the view axis, m
+uniform sampler2D g_diffuse;   // reflectance; shininess, or minus alpha of GGX
+uniform sampler2D g_specular;  // reflectance at normal incidence; metallic
+// What is the same all over is made by the vertices: each number that a pixel reads of a
+// uniform costs a software device more than a multiplication.
+noperspective in vec2 window;
+noperspective in vec3 ray;     // m; orthographic: from the eye's plane, else along to distance 1
+#ifdef ORTHOGRAPHIC
+uniform vec3 forward;          // unit vector along the view axis
+#endif
 flat in vec4 data[FIRST * ROWS + CONED * 3];
 layout(location = 0) out vec4 hdr;
 
@@ -160,10 +168,15 @@ void reflect_light(Surface s, Arrival a)
 void main()
 {
     Surface s;
-    float depth;
-    s.n = g_normal_at(window, depth);
-    s.p = g_position_at(window, depth);
-    s.v = g_toward_eye(s.p);
+    vec4 normal = textureLod(g_normal, window, 0.0);
+    s.n = normal.xyz;
+#ifdef ORTHOGRAPHIC
+    s.p = ray + forward * normal.w;
+    s.v = -forward;
+#else
+    s.p = ray * normal.w;
+    s.v = -normalize(ray);
+#endif
     s.nv = dot(s.n, s.v);
     vec4 diffuse = textureLod(g_diffuse, window, 0.0);
     s.gloss = diffuse.w;

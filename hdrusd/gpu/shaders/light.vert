@@ -7,10 +7,15 @@ uniform sampler2D lights;  // texels, light after light
 uniform isampler2D order;  // where lights begin in it, batch after batch
 uniform ivec2 dark;        // where a light begins that is not there, of either kind
 uniform vec2 size;         // of the picture, pixels
+uniform vec3 ray_origin, ray_x, ray_y;  // the window's corner and sides at distance 1, m
+#ifndef ORTHOGRAPHIC
+uniform vec3 forward;      // unit vector along the view axis
+#endif
 
 #define CONE_ROWS 3
 flat out vec4 data[FIRST * ROWS + CONED * CONE_ROWS];
-out vec2 window;           // 0 to 1 over the picture
+noperspective out vec2 window;  // 0 to 1 over the picture
+noperspective out vec3 ray;     // m, from the eye to what it sees there at distance 1
 
 int light_at(int index)
 {
@@ -28,6 +33,10 @@ void main()
 {
     window = vec2((gl_VertexID & 1) == 0 ? in_area.x : in_area.z,
                   (gl_VertexID & 2) == 0 ? in_area.y : in_area.w) / size;
+    ray = ray_origin + window.x * ray_x + window.y * ray_y;
+#ifndef ORTHOGRAPHIC
+    ray += forward;
+#endif
     gl_Position = vec4(window * 2.0 - 1.0, 1.0, 1.0);  // farthest: only pixels with a surface pass
 #if FIRST > 0
     for (int i = 0; i < FIRST; ++i) {

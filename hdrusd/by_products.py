@@ -1,0 +1,95 @@
+"""What a sequence leaves beside its pictures: what the eye went through, and a video."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from hdrusd.adaptation_log import AdaptationLog, check_plot
+from hdrusd.images import read_image
+from hdrusd.tonemap.operator import Moment, Operator
+from hdrusd.video import VideoWriter
+
+
+class ByProducts:
+    """A table of the eye (``csv``), its plot, and a video; each only where it has a name.
+
+    Without an operator there is nothing to tell. To be used in a ``with`` block. An interrupted
+    sequence leaves the table of what was seen, and no video. Raises HdrusdError where an extra
+    is missing, before any work.
+    """
+
+    def __init__(
+        self,
+        operator: Operator | None,
+        *,
+        csv: Path | None = None,
+        plot: Path | None = None,
+        video: Path | None = None,
+        fps: float = 24.0,
+        resume: bool = False,
+    ) -> None:
+        if plot is not None:
+            check_plot()
+        self.operator = operator
+        self.csv = csv
+        self.plot = plot
+        self.log = AdaptationLog()
+        if resume and csv is not None and csv.is_file():
+            self.log = AdaptationLog.read_csv(csv)
+        self._stack = contextlib.ExitStack()
+        self._video = None if video is None else VideoWriter(video, fps)
+
+    def __enter__(self) -> ByProducts:
+        if self._video is not None:
+            self._stack.enter_context(self._video)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            if self.log.rows:
+                if self.csv is not None:
+                    self.log.write_csv(self.csv)
+                if self.plot is not None and error is None:
+                    self.log.write_plot(self.plot, self.operator.title if self.operator else "")
+        finally:
+            self._stack.__exit__(kind, error, trace)
+
+    def add(
+        self, frame: float, time: float, moment: Moment | None, picture: Any, file: Path | None
+    ) -> None:
+        """The next frame; ``picture`` None: as it is in ``file`` already."""
+        if moment is not None:
+            self.log.add(frame, time, self._numbers(moment))
+        if self._video is not None and (picture is not None or file is not None):
+            pixels = (
+                picture if file is None or picture is not None else read_image(file).pixels[..., :3]
+            )
+            self._video.add(eight_bits(pixels))
+
+    def _numbers(self, moment: Moment) -> Mapping[str, float]:
+        numbers: dict[str, float] = {}
+        stats = moment.statistics
+        if stats is not None:
+            numbers["average luminance [cd/m2]"] = stats.average
+            numbers["log average luminance [cd/m2]"] = stats.log_average
+        if self.operator is not None and self.operator.trace is not None:
+            numbers |= self.operator.trace(moment)
+        return numbers
+
+
+def eight_bits(picture: Any) -> Any:
+    """Code values of 16 bits as 8, rounded; 8 bits as they are."""
+    if picture.dtype == np.uint16:
+        return ((picture.astype(np.uint32) * 255 + 32767) // 65535).astype(np.uint8)
+    return np.ascontiguousarray(picture)

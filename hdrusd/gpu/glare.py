@@ -1,0 +1,214 @@
+"""The veil of glare on the GPU; what it draws is defined in glare/pyramid.py.
+
+Every level is an RGBA32F texture: half floats end at 65504, and lamps are brighter.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from hdrusd.eye.observer import Observer
+from hdrusd.glare.model import GlareModel
+from hdrusd.glare.pyramid import MARGIN, Pyramid, as_lamps, pyramid
+from hdrusd.gpu.blending import blending
+from hdrusd.gpu.program import Programs, set_uniforms
+
+_DOWN, _LEVEL = "gpu/shaders/glare_down.frag", "gpu/shaders/glare_level.frag"
+_VEIL = "gpu/shaders/glare_veil.frag"
+_LAMP = "gpu/shaders/glare_lamp.vert", "gpu/shaders/glare_lamp.frag"
+
+
+class GlarePass:
+    """Draws veils on frames of any size; textures of the last size are kept."""
+
+    def __init__(self, ctx: moderngl.Context, programs: Programs) -> None:
+        self.ctx = ctx
+        self.programs = programs
+        self._texels = ctx.sampler(
+            repeat_x=False,
+            repeat_y=False,
+            filter=(moderngl.NEAREST, moderngl.NEAREST),
+            border_color=(0.0, 0.0, 0.0, 0.0),
+        )
+        self._between = ctx.sampler(
+            repeat_x=False, repeat_y=False, filter=(moderngl.LINEAR, moderngl.LINEAR)
+        )
+        self._size = (0, 0)
+        self._frames: dict[tuple[str, int], moderngl.Framebuffer] = {}
+        self._wide: moderngl.Texture | None = None
+
+    def veil(
+        self,
+        hdr: moderngl.Texture,
+        field: tuple[float, float],
+        model: GlareModel,
+        observer: Observer,
+        lamps: npt.ArrayLike | None = None,
+    ) -> moderngl.Texture:
+        """The veiled picture: RGBA32F of the size of ``hdr``, valid until the next one.
+
+        ``hdr``: RGB(A) float texture in cd/m2, bottom row first; NaN and negative channels
+        are black, A stays as it is. ``field``: width and height of the perspective picture,
+        degrees. ``lamps`` (n, 6): those that the picture does not hold (glare/veil.py); they
+        add nothing to a model without a point spread. Raises HdrusdError for a field or
+        lamps that cannot be.
+        """
+        plan = pyramid(model, observer, hdr.size, field)
+        rows = None if lamps is None else as_lamps(lamps)
+        if self._size != hdr.size:
+            self._forget()
+            self._size = hdr.size
+        self._halve(hdr, plan)
+        veil = self._spread(plan, rows)
+        for level in range(plan.last, plan.first - 1, -1):
+            if not plan.weights:
+                break
+            if rows is not None:
+                self._splat(plan, level, rows)
+            veil = self._add(plan, level, veil)
+        return self._compose(hdr, plan, veil)
+
+    def release(self) -> None:
+        """Give the textures back."""
+        self._forget()
+        self._texels.release()
+        self._between.release()
+
+    # -- steps ---------------------------------------------------------------------------
+
+    def _halve(self, hdr: moderngl.Texture, plan: Pyramid) -> None:
+        start = min(plan.first, 1)
+        self._draw(
+            self._frame(plan, "level", start),
+            _DOWN,
+            {"FROM_FRAME": 1, "STEP": start},
+            {"below": (hdr, self._texels)},
+            {"texel": _texel(hdr)},
+        )
+        for level in range(start + 1, plan.last + 1):
+            below = self._texture(plan, "level", level - 1)
+            self._draw(
+                self._frame(plan, "level", level),
+                _DOWN,
+                {"STEP": 1},
+                {"below": (below, self._texels)},
+                {"texel": _texel(below)},
+            )
+
+    def _spread(self, plan: Pyramid, lamps: npt.NDArray[Any] | None) -> moderngl.Texture:
+        """What is added at the last level by the matrix: few texels, so on the CPU."""
+        w, h = plan.level_size(plan.last)
+        start = MARGIN - 1
+        data = self._frame(plan, "level", plan.last).read(
+            viewport=(start, start, w + 2, h + 2), components=4, dtype="f4", alignment=1
+        )
+        texels = np.frombuffer(data, np.float32).reshape(h + 2, w + 2, 4)
+        size = w + 2 * MARGIN, h + 2 * MARGIN
+        if self._wide is None or self._wide.size != size:
+            if self._wide is not None:
+                self._wide.release()
+            self._wide = self.ctx.texture(size, 4, dtype="f4")
+        around = [(start, start), (start, start), (0, 0)]
+        self._wide.write(np.pad(plan.wide_light(texels, lamps), around).tobytes())
+        return self._wide
+
+    def _splat(self, plan: Pyramid, level: int, lamps: npt.NDArray[Any]) -> None:
+        place, light = plan.splats(level, lamps)
+        if not len(place):
+            return
+        frame = self._frame(plan, "level", level)
+        program = self.programs.get(*_LAMP)
+        set_uniforms(program, {"size": frame.size})
+        buffer = self.ctx.buffer(np.concatenate([place, light], axis=1).astype(np.float32))
+        points = self.ctx.vertex_array(program, [(buffer, "2f 3f", "place", "light")])
+        with self.ctx.scope(frame, moderngl.NOTHING), blending(self.ctx, frame):
+            points.render(moderngl.POINTS)
+        points.release()
+        buffer.release()
+
+    def _add(self, plan: Pyramid, level: int, veil: moderngl.Texture) -> moderngl.Texture:
+        source = self._texture(plan, "level", level)
+        coarser = level < plan.last
+        uniforms: dict[str, Any] = {
+            "texel": _texel(source),
+            "weights": plan.weights[level - plan.first],
+        }
+        if coarser:
+            uniforms["veil_texel"] = _texel(veil)
+        self._draw(
+            self._frame(plan, "veil", level),
+            _LEVEL,
+            {"COARSER": 1} if coarser else {},
+            {
+                "source": (source, self._texels),
+                "veil": (veil, self._between if coarser else self._texels),
+            },
+            uniforms,
+        )
+        return self._texture(plan, "veil", level)
+
+    def _compose(
+        self, hdr: moderngl.Texture, plan: Pyramid, veil: moderngl.Texture
+    ) -> moderngl.Texture:
+        self._draw(
+            self._frame(plan, "whole", 0),
+            _VEIL,
+            {"SCALE": float(1 << plan.first)},
+            {"hdr": (hdr, self._texels), "veil": (veil, self._between)},
+            {"texel": _texel(hdr), "veil_texel": _texel(veil)},
+        )
+        return self._texture(plan, "whole", 0)
+
+    # -- what they need ------------------------------------------------------------------
+
+    def _draw(
+        self,
+        frame: moderngl.Framebuffer,
+        fragment: str,
+        defines: dict[str, float],
+        textures: dict[str, tuple[moderngl.Texture, moderngl.Sampler]],
+        uniforms: dict[str, Any],
+    ) -> None:
+        vertices = self.programs.fullscreen(fragment, {"MARGIN": MARGIN, **defines})
+        units = {name: unit for unit, name in enumerate(textures)}
+        set_uniforms(vertices.program, {**units, **uniforms})
+        for unit, (texture, sampler) in enumerate(textures.values()):
+            texture.use(unit)
+            sampler.use(unit)
+        with self.ctx.scope(frame, moderngl.NOTHING):
+            vertices.render(vertices=3)
+        for unit, (_, sampler) in enumerate(textures.values()):
+            sampler.clear(unit)
+
+    def _frame(self, plan: Pyramid, kind: str, level: int) -> moderngl.Framebuffer:
+        """The target of a step; a level has its margin, the whole picture has none."""
+        key = kind, level
+        if key not in self._frames:
+            w, h = plan.level_size(level)
+            around = 0 if kind == "whole" else 2 * MARGIN
+            texture = self.ctx.texture((w + around, h + around), 4, dtype="f4")
+            texture.filter = moderngl.NEAREST, moderngl.NEAREST
+            self._frames[key] = self.ctx.framebuffer([texture])
+        return self._frames[key]
+
+    def _texture(self, plan: Pyramid, kind: str, level: int) -> moderngl.Texture:
+        texture: moderngl.Texture = self._frame(plan, kind, level).color_attachments[0]
+        return texture
+
+    def _forget(self) -> None:
+        for frame in self._frames.values():
+            for texture in frame.color_attachments:
+                texture.release()
+            frame.release()
+        self._frames.clear()
+        if self._wide is not None:
+            self._wide.release()
+            self._wide = None
+
+
+def _texel(texture: moderngl.Texture) -> tuple[float, float]:
+    return 1.0 / texture.width, 1.0 / texture.height

@@ -1,0 +1,97 @@
+"""One curve for all pixels, from ln scene luminance to ln display luminance; twin of curve.glsl.
+
+The curve is given at equally spaced brightnesses and straight between them, as a cumulated
+histogram is (Ward Larson, Rushmeier, Piatko, IEEE TVCG 3(4), 1997, eq. 4). Beyond its ends it
+goes on in proportion to the luminance, until the display's black or white stops it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hdrusd.colour import luminance, to_gamut, with_luminance
+from hdrusd.eye.screen import Screen
+
+Array = npt.NDArray[Any]
+
+#: Darkest that a display is taken to show, in whites: the first code of 8 bits above 0 is 3e-4.
+DEEPEST = 1e-4
+
+#: cd/m2 that stand for 0 where a logarithm is taken.
+LEAST = 1e-30
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """Ln cd/m2 on the display (n + 1,) at equal steps of ln cd/m2 of the scene, bmin to bmax.
+
+    ``black`` and ``white``, cd/m2, are what a display shows for 0 and 1.
+    """
+
+    bmin: float
+    bmax: float
+    log_display: Array
+    black: float
+    white: float
+
+    def display(self, y: npt.ArrayLike) -> Array:
+        """Display luminance for a scene luminance, cd/m2 both, any shape."""
+        b = np.log(np.maximum(np.asarray(y, np.float64), LEAST))
+        edges = np.linspace(self.bmin, self.bmax, self.log_display.size)
+        beyond = b - np.clip(b, self.bmin, self.bmax)
+        shown = np.exp(np.interp(b, edges, self.log_display) + beyond)
+        limited: Array = np.clip(shown, self.black, self.white)
+        return limited
+
+    def uniforms(self) -> dict[str, Any]:
+        """What ``curve`` and its twin read: start and rise of each step, and the ranges."""
+        pairs = np.stack([self.log_display[:-1], np.diff(self.log_display)], axis=-1)
+        return {
+            "curve_steps": pairs[None].astype(np.float32),
+            "curve_from": (self.bmin, self.bmax),
+            "curve_to": (self.black, self.white),
+        }
+
+
+def display_range(screen: Screen) -> tuple[float, float]:
+    """Luminances in cd/m2 between which a curve may use a screen, logarithms taken.
+
+    A screen that shows black as nothing is taken to show DEEPEST of its white.
+    """
+    return max(screen.black_level, DEEPEST * screen.white_level), screen.white_level
+
+
+def proportional(scale: float, white: float, black: float = 0.0) -> Curve:
+    """The curve display luminance = ``scale`` x scene luminance, up to ``white`` cd/m2."""
+    top = math.log(white)
+    end = top - math.log(scale)
+    return Curve(end - 1.0, end, np.array([top - 1.0, top]), black, white)
+
+
+def curve_value(y: npt.ArrayLike, uniforms: Mapping[str, Any]) -> Array:
+    """Display-relative value in [0, 1] for a scene luminance in cd/m2, any shape."""
+    steps = np.asarray(uniforms["curve_steps"], np.float64)[0]
+    bmin, bmax = uniforms["curve_from"]
+    black, white = uniforms["curve_to"]
+    b = np.log(np.maximum(np.asarray(y, np.float64), LEAST))
+    inside = np.clip(b, bmin, bmax)
+    place = (inside - bmin) * (len(steps) / (bmax - bmin))
+    step = np.minimum(place.astype(np.intp), len(steps) - 1)
+    shown = steps[step, 0] + (place - step) * steps[step, 1] + (b - inside)
+    # Cut before the exponential, which the sun would overflow in float32.
+    shown = np.exp(np.minimum(shown, math.log(white)))
+    value: Array = np.clip((shown - black) / (white - black), 0.0, 1.0)
+    return value
+
+
+def curve(rgb: npt.ArrayLike, uniforms: Mapping[str, Any]) -> Array:
+    """cd/m2 (..., 3) to display-linear [0, 1] by ``Curve.uniforms``; chromaticity is kept."""
+    rgb = np.asarray(rgb)
+    value = curve_value(luminance(rgb), uniforms)
+    return to_gamut(with_luminance(rgb, value), value)

@@ -1,0 +1,202 @@
+"""One frame as an eye sees it: glare, adaptation, acuity, colour, tone mapping, the screen.
+
+``Eye`` does it on the GPU, shader 2; ``ReferenceEye`` is its definition in NumPy. Both take the
+steps in this order:
+
+1. what the eye's own media scatter lies over the frame (glare);
+2. the veiled frame is measured, and the eye adapts to it (Course, Operator.advance);
+3. details that it cannot resolve are gone (acuity);
+4. colours fade and turn blue where rods see (night colour);
+5. the operator says what the screen shall show, the screen's curve what it is told.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from hdrusd.colour import (
+    bt1886_encode,
+    clean,
+    dither,
+    gamma_encode,
+    pq_encode,
+    quantise,
+    srgb_encode,
+    to_rec2020,
+)
+from hdrusd.course import Course
+from hdrusd.eye.foveal import default_field
+from hdrusd.eye.observer import Observer
+from hdrusd.eye.screen import Screen
+from hdrusd.gpu.ldr import ToneMapper, deep
+from hdrusd.gpu.measure import Measurer
+from hdrusd.gpu.program import Programs
+from hdrusd.tonemap.falsecolour import OPERATOR as FALSE_COLOUR
+from hdrusd.tonemap.legend import SMALLEST, paint_legend
+from hdrusd.tonemap.operator import Moment, Need, Operator, Parameters, statistics
+
+Array = npt.NDArray[Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Viewing:
+    """Who looks, at what screen, and what of the eye is modelled beside the operator."""
+
+    operator: Operator
+    parameters: Parameters = field(default_factory=dict)
+    observer: Observer = field(default_factory=Observer)
+    screen: Screen = field(default_factory=Screen)
+
+    def moment(self, parameters: Parameters | None = None) -> Moment:
+        """A frame seen so, not yet measured; ``parameters`` in place of one's own."""
+        given = self.parameters if parameters is None else parameters
+        return self.operator.moment(given, None, self.observer, self.screen)
+
+    def setup(self) -> dict[str, Any]:
+        """All of it by name and number, as JSON has it."""
+        return {
+            "operator": self.operator.name,
+            "parameters": self.operator.settings(self.parameters),
+            "observer": asdict(self.observer),
+            "screen": asdict(self.screen),
+        }
+
+    def needs(self, moment: Moment) -> Need:
+        """What has to be measured of a frame."""
+        return self.operator.needs(moment.parameters)
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """What of a frame is known beside its pixels.
+
+    ``time`` in s, ``frame`` its number; ``field``: width and height in degrees, None where the
+    camera is unknown; ``parameters`` of the operator where they are this frame's own.
+    """
+
+    time: float = 0.0
+    frame: float = 0.0
+    field: tuple[float, float] | None = None
+    parameters: Parameters | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What was shown of a frame: code values (h, w, 3), top row first; and why."""
+
+    picture: Array
+    moment: Moment
+
+
+class Eye:
+    """Frames on the GPU, in the order in which they are seen."""
+
+    def __init__(
+        self, ctx: moderngl.Context, programs: Programs, viewing: Viewing, course: Course
+    ) -> None:
+        self.viewing = viewing
+        self.course = course
+        self.mapper = ToneMapper(ctx, programs)
+        self.measurer = Measurer(ctx, programs)
+
+    def see(self, hdr: moderngl.Texture, sight: Sight, *, top_first: bool = False) -> Moment:
+        """Adapt to an RGB(A) float texture in cd/m2, without a picture of it."""
+        return self._adapt(hdr, sight, top_first)
+
+    def show(self, hdr: moderngl.Texture, sight: Sight, *, top_first: bool = False) -> Shown:
+        """Adapt to a texture in cd/m2, and the picture of it."""
+        moment = self._adapt(hdr, sight, top_first)
+        picture = self.mapper.apply(hdr, self.viewing.operator, moment, top_first=top_first)
+        add_legend(picture, self.viewing.operator, moment)
+        return Shown(picture, moment)
+
+    def upload(self, rgb: npt.NDArray[np.float32]) -> moderngl.Texture:
+        """A frame (h, w, 3), top row first, as a texture whose top row is first."""
+        return self.mapper.upload(rgb)
+
+    def release(self) -> None:
+        """Free what is on the GPU."""
+        self.mapper.release()
+
+    def _adapt(self, hdr: moderngl.Texture, sight: Sight, top_first: bool) -> Moment:
+        moment = self.viewing.moment(sight.parameters)
+        angles = sight.field or default_field(*hdr.size)
+        need = self.viewing.needs(moment)
+        stats = self.measurer.measure(hdr, need, angles, top_first=top_first)
+        return self.course.advance(replace(moment, statistics=stats), sight.time, sight.frame)
+
+
+class ReferenceEye:
+    """Frames in NumPy: what ``Eye`` means."""
+
+    def __init__(self, viewing: Viewing, course: Course) -> None:
+        self.viewing = viewing
+        self.course = course
+
+    def see(self, rgb: npt.ArrayLike, sight: Sight) -> Moment:
+        """Adapt to a frame (h, w, 3) in cd/m2, without a picture of it."""
+        return self._adapt(clean(rgb), sight)
+
+    def show(self, rgb: npt.ArrayLike, sight: Sight) -> Shown:
+        """Adapt to a frame, and the picture of it."""
+        veiled = clean(rgb)
+        moment = self._adapt(veiled, sight)
+        operator = self.viewing.operator
+        picture = encode(operator.apply(veiled, moment=moment), operator, moment.screen)
+        add_legend(picture, operator, moment)
+        return Shown(picture, moment)
+
+    def _adapt(self, rgb: Array, sight: Sight) -> Moment:
+        moment = self.viewing.moment(sight.parameters)
+        angles = sight.field or default_field(rgb.shape[1], rgb.shape[0])
+        stats = statistics(rgb, need, angles) if (need := self.viewing.needs(moment)) else None
+        return self.course.advance(replace(moment, statistics=stats), sight.time, sight.frame)
+
+
+def reads_screen(operator: Operator, parameters: Parameters) -> bool:
+    """Whether an operator's picture depends on the screen's peak and black."""
+    moments = [
+        operator.moment(parameters, None, None, Screen(peak=peak, black=black))
+        for peak, black in ((100.0, 1.0), (300.0, 0.5))
+    ]
+    frame = np.geomspace(0.01, 1e4, 48).reshape(4, 4, 3)
+    stats = statistics(frame, operator.needs(moments[0].parameters))
+    first, second = (
+        operator.apply(frame, moment=operator.steady(replace(moment, statistics=stats)))
+        for moment in moments
+    )
+    return not np.array_equal(first, second)
+
+
+def encode(linear: Array, operator: Operator, screen: Screen) -> Array:
+    """Display-linear [0, 1], (h, w, 3), as code values: 8 bits with dither, or 16."""
+    code = linear if operator.encoded else _encoded(linear, screen)
+    if deep(screen):
+        return (code * 65535.0 + 0.5).astype(np.uint16)
+    rows, columns = np.mgrid[0 : linear.shape[0], 0 : linear.shape[1]]
+    offset = dither(columns, rows)[..., None]  # the same for all three channels
+    return np.asarray(quantise(code, offset), np.uint8)
+
+
+def _encoded(linear: Array, screen: Screen) -> Array:
+    if screen.eotf == "gamma22":
+        return gamma_encode(linear, 2.2)
+    if screen.eotf == "bt1886":
+        return bt1886_encode(linear, screen.black, screen.peak)
+    if screen.eotf == "pq":
+        emitted = screen.black + linear * (screen.peak - screen.black)
+        return pq_encode(np.maximum(to_rec2020(emitted), 0.0))
+    return srgb_encode(linear)
+
+
+def add_legend(picture: Array, operator: Operator, moment: Moment) -> None:
+    """The cd/m2 scale on a false colour picture that has room for it, in place."""
+    room = all(have >= need for have, need in zip(picture.shape, SMALLEST, strict=False))
+    if operator.name == FALSE_COLOUR.name and room and picture.dtype == np.uint8:
+        settings = moment.parameters
+        paint_legend(picture, float(settings["scale"] or 0), float(settings["decades"] or 0))
