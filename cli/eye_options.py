@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from hdrusd.course import Start
     from hdrusd.eye.observer import Observer
     from hdrusd.eye.screen import Screen
+    from hdrusd.glare.model import GlareModel
     from hdrusd.tonemap.operator import Operator
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -112,6 +113,14 @@ def chosen_screen(options: dict[str, Any]) -> Screen | None:
     return Screen.parse(options["screen"]) if options["screen"] else None
 
 
+def chosen_glare(options: dict[str, Any]) -> GlareModel | None:
+    """Raises UnknownNameError."""
+    from hdrusd.glare.model import MODELS
+
+    name = options["glare"]
+    return None if name in (None, "none") else MODELS[name]
+
+
 def chosen_start(options: dict[str, Any], operator: Operator, first: float) -> Start:
     """What the eye did before the frame ``first``. Raises UsageError, InputError."""
     from hdrusd.course import Start, read_state
@@ -165,3 +174,9 @@ def plot_file(pattern: str, options: dict[str, Any]) -> Path | None:
     if plot is None or not options.get("sequence", True):
         raise click.UsageError("--plot: want a numbered sequence, as out.####.png")
     return plot
+
+
+def night_vision(options: dict[str, Any]) -> dict[str, bool]:
+    """--night-vision as what Viewing and Job call its parts."""
+    chosen = options["night_vision"]
+    return {"acuity": chosen in ("acuity", "all"), "night_colour": chosen in ("colour", "all")}

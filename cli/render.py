@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 import time
 from pathlib import Path
@@ -15,10 +16,12 @@ from hdrusd.frames import check_pattern, parse_frames
 from .eye_options import (
     beside,
     chosen_cuts,
+    chosen_glare,
     chosen_observer,
     chosen_screen,
     chosen_start,
     eye_options,
+    night_vision,
     plot_file,
 )
 from .options import (
@@ -169,6 +172,14 @@ COMPLEXITIES |= {"1.0": 0, "1.1": 1, "1.2": 2, "1.3": 3}
     show_default=True,
     help="Of the EXR, lossless. htj2k is small and quick; readers need OpenEXR 3.4.",
 )
+@click.option(
+    "--scotopic",
+    is_flag=True,
+    help="Write what rods see as the EXR's layer scotopic.Y, by the S/P ratios of lamps.",
+)
+@click.option(
+    "--mesopic", is_flag=True, help="Write mesopic luminance (CIE 191) as the layer mesopic.Y."
+)
 @click.option("--half", is_flag=True, help="Half floats in the EXR; above 65504 they clip.")
 @click.option("--resume", is_flag=True, help="Skip frames whose files are there.")
 @eye_options
@@ -213,7 +224,7 @@ def command(stage: Path, output: str, **options: Any) -> None:
 
 def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
     """The options as a Job. Raises UsageError for what does not go together."""
-    from hdrusd.render import Job
+    from hdrusd.job import Job
     from hdrusd.tonemap.operator import DEFAULT_OPERATOR, OPERATORS
 
     suffix = Path(output).suffix.lower()
@@ -222,6 +233,8 @@ def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
     exr, png = (output, options["png"]) if suffix == ".exr" else (None, output)
     if suffix == ".png" and options["png"]:
         raise click.UsageError("--png: OUTPUT is a PNG already; want OUTPUT.exr beside it")
+    if exr is None and (options["scotopic"] or options["mesopic"]):
+        raise click.UsageError("--scotopic, --mesopic: layers of an EXR; want OUTPUT.exr")
     if png is not None and Path(png).suffix.lower() != ".png":
         raise click.UsageError(f"--png {png}: want a name that ends in .png")
     if options["frames"] is not None and options["default_time"]:
@@ -236,7 +249,7 @@ def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
         operator = chosen_operator(options["operator"], settings)
     elif png is None:
         _no_picture(options)
-    first = times[0] if times else 0.0
+    first = times[0] if times else math.inf
     return Job(
         stage=stage,
         times=[float("nan")] if options["default_time"] else times,
@@ -249,6 +262,8 @@ def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
         parameters=settings,
         observer=chosen_observer(options),
         screen=chosen_screen(options),
+        glare=chosen_glare(options),
+        **night_vision(options),
         start=chosen_start(options, operator or OPERATORS[DEFAULT_OPERATOR], first),
         cut=options["cut"],
         cuts=chosen_cuts(options),
@@ -270,6 +285,8 @@ def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
         shadows=options["shadows"] == "maps",
         lights=options["lights"],
         sky_samples=options["sky_samples"],
+        scotopic=options["scotopic"],
+        mesopic=options["mesopic"],
         half=options["half"],
         compression=options["compression"],
         resume=options["resume"],

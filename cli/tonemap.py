@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,12 @@ from hdrusd.frames import check_pattern, find_frames, frame_path, has_placeholde
 from .eye_options import (
     beside,
     chosen_cuts,
+    chosen_glare,
     chosen_observer,
     chosen_screen,
     chosen_start,
     eye_options,
+    night_vision,
     plot_file,
 )
 from .options import (
@@ -83,7 +86,9 @@ def command(source: str, output: str, **options: Any) -> None:
     from hdrusd.report import Report
 
     report = Report()
-    showing = _showing(output, pairs[0][0], options)
+    # A single picture has no number that a state could be later than.
+    first = pairs[0][0] if has_placeholder(source) else math.inf
+    showing = _showing(output, first, options)
     label = showing.viewing.operator.name
     jobs = [(time, file, frame_path(output, time)) for time, file in pairs]
     written: list[str] = []
@@ -119,7 +124,14 @@ def _showing(output: str, first: float, options: dict[str, Any]) -> Any:
     parameters = parse_settings(options["settings"])
     operator = chosen_operator(options["operator"], parameters)
     screen = chosen_screen(options) or Screen()
-    viewing = Viewing(operator, parameters, chosen_observer(options), screen)
+    viewing = Viewing(
+        operator,
+        parameters,
+        chosen_observer(options),
+        screen,
+        chosen_glare(options),
+        **night_vision(options),
+    )
     return Showing(
         viewing,
         start=chosen_start(options, operator, first),

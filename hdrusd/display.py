@@ -18,10 +18,10 @@ from hdrusd.course import Checkpoints, Course, Cut, Start
 from hdrusd.errors import SourceRef
 from hdrusd.gpu.context import create_context
 from hdrusd.gpu.program import Programs
-from hdrusd.images import REC709, read_exr, read_exr_header, write_png
+from hdrusd.images import REC709, read_exr_header, read_exr_layers, write_png
 from hdrusd.report import Kind, Report
 from hdrusd.tonemap.operator import Moment
-from hdrusd.viewing import Eye, ReferenceEye, Shown, Sight, Viewing
+from hdrusd.viewing import Eye, ReferenceEye, Shown, Sight, Viewing, with_rods
 
 #: Pictures that wait for the writer; each holds a frame in memory.
 _WAITING = 2
@@ -114,11 +114,14 @@ def tonemap_sequence(
                     yield Seen(frame, target, math.nan, None, None)
                     continue
                 eye = eye or _Eye(showing, course)
-                rgb, header = read_exr(source)
+                rgb, header, layers = read_exr_layers(source)
                 _note_units(source, header, report)
                 time = clock.time(frame, source, header)
                 angles = field_of(header, rgb.shape[1], rgb.shape[0], showing.across)
-                moment, shown = eye.look(rgb, Sight(time, frame, angles), picture=not there)
+                rods = layers.get("scotopic.Y") if showing.viewing.night_colour else None
+                pixels = rgb if rods is None else with_rods(rgb, rods)
+                sight = Sight(time, frame, angles, rods=rods is not None)
+                moment, shown = eye.look(pixels, sight, picture=not there)
                 if states is not None:
                     states.keep(frame, time, moment.state)
                 beside.add(frame, time, moment, shown.picture if shown else None, target)

@@ -125,13 +125,15 @@ def write_exr(
     half: bool = False,
     luminance: bool = True,
     compression: Compression = "zip",
+    layers: Mapping[str, npt.NDArray[np.floating[Any]]] | None = None,
 ) -> None:
     """Write linear Rec. 709 RGB or RGBA, (h, w, 3 or 4), top row first.
 
     ``luminance``: the values are cd/m2 and the header says so; False for
     reflectance maps. ``attributes``: further header entries (str, int, float,
     NumPy arrays of 9 or 16 floats). ``half``: half floats; what is beyond +-65504 is
-    written as that (``half_clipped`` counts it). ``compression`` loses nothing.
+    written as that (``half_clipped`` counts it). ``compression`` loses nothing. ``layers``:
+    channels beside the colour, (h, w), by names as "scotopic.Y"; always as float32.
     """
     dtype = np.float16 if half else np.float32
     pixels = np.ascontiguousarray(np.clip(rgb, -HALF_MAX, HALF_MAX) if half else rgb, dtype)
@@ -145,6 +147,8 @@ def write_exr(
         header["whiteLuminance"] = 1.0
     header.update(attributes or {})
     channels = {"RGBA" if pixels.shape[2] == 4 else "RGB": pixels}
+    for name, values in (layers or {}).items():
+        channels[name] = np.ascontiguousarray(values, np.float32)
 
     def write(temporary: Path) -> None:
         with OpenEXR.File(header, channels) as file:
@@ -164,6 +168,18 @@ def read_exr(path: Path) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
     Values are multiplied by ``whiteLuminance`` where a file has another than 1,
     so that 1.0 is 1 cd/m2. The first part of a file is read, its data window.
     Raises InputError.
+    """
+    rgb, header, _ = read_exr_layers(path)
+    return rgb, header
+
+
+def read_exr_layers(
+    path: Path,
+) -> tuple[npt.NDArray[np.float32], dict[str, Any], dict[str, npt.NDArray[np.float32]]]:
+    """As ``read_exr``, and the channels in layers ("scotopic.Y"), (h, w) float32 by name.
+
+    They are multiplied by ``whiteLuminance`` too. One of another size than the picture is not
+    given. Raises InputError.
     """
     if not path.is_file():
         raise InputError(path, "no such file")
@@ -186,7 +202,15 @@ def read_exr(path: Path) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
     white = float(header.get("whiteLuminance", 1.0))
     if not 0.0 < white < np.inf:
         raise InputError(path, f"whiteLuminance {white:g}; want a positive number")
-    return (rgb if white == 1.0 else (rgb * white).astype(np.float32)), header
+    layers = {
+        name: channel.astype(np.float32)
+        for name, channel in channels.items()
+        if "." in name and channel.shape == (height, width)
+    }
+    if white != 1.0:
+        rgb = (rgb * white).astype(np.float32)
+        layers = {name: (layer * white).astype(np.float32) for name, layer in layers.items()}
+    return rgb, header, layers
 
 
 def read_exr_header(path: Path) -> dict[str, Any]:

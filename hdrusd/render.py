@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -14,72 +14,33 @@ import numpy.typing as npt
 from pxr import Tf, UsdGeom
 
 from hdrusd.by_products import ByProducts
-from hdrusd.course import Checkpoints, Course, Cut, Start, state_text
+from hdrusd.course import Checkpoints, Course, state_text
 from hdrusd.display import Writer, first_to_see
 from hdrusd.errors import HdrusdError, InputError, SourceRef
-from hdrusd.eye.observer import Observer
+from hdrusd.eye.mesopic import mesopic_layer
+from hdrusd.eye.scotopic import scotopic
 from hdrusd.eye.screen import Screen
 from hdrusd.frames import frame_path
-from hdrusd.gpu.hdr import HdrRenderer, Options, Reflection
-from hdrusd.gpu.lights import LightMode
+from hdrusd.gpu.hdr import HdrRenderer, Options
 from hdrusd.gpu.program import Programs
-from hdrusd.images import Compression, half_clipped, write_exr, write_png
+from hdrusd.images import half_clipped, write_exr, write_png
+from hdrusd.job import Job
+from hdrusd.photometry.eye_illuminance import eye_illuminance
+from hdrusd.photometry.scotopic_light import scotopic_scene
 from hdrusd.report import Kind, Report
-from hdrusd.scene import Camera
-from hdrusd.tonemap.operator import DEFAULT_OPERATOR, OPERATORS, Moment, Operator, Parameters
-from hdrusd.units import TEXTURE_GAMMA
+from hdrusd.scene import Camera, RenderScene
+from hdrusd.tonemap.operator import DEFAULT_OPERATOR, OPERATORS, Moment, Operator
 from hdrusd.usd.extract import StageReader
 from hdrusd.usd.opening import one_line_of, open_stage, usd_warnings
 from hdrusd.usd.settings import read_settings
 from hdrusd.usd.textures import TextureLoader
-from hdrusd.viewing import Eye, Sight, Viewing, reads_screen
+from hdrusd.viewing import Eye, Sight, Viewing, reads_screen, with_rods
 
 #: Width of a picture that neither the stage nor the user sizes (usdrecord's).
 DEFAULT_WIDTH = 960
 
 #: The largest picture; OpenGL 3.3 grants no more on many devices.
 MAX_SIZE = 16384
-
-
-@dataclass(frozen=True, slots=True)
-class Job:
-    """What to render. ``exr`` and ``png`` are file name patterns, either may be None."""
-
-    stage: Path
-    times: Sequence[float] | None = None  # None: the stage's start
-    exr: str | None = None
-    png: str | None = None
-    camera: str | None = None
-    width: int | None = None
-    height: int | None = None
-    operator: Operator | None = None  # None: the stage's, where a PNG is asked for
-    parameters: Parameters = field(default_factory=dict)
-    observer: Observer = field(default_factory=Observer)
-    screen: Screen | None = None  # None: the stage's peak and black, else Screen's own
-    start: Start = field(default_factory=Start)
-    cut: Cut = "keep"
-    cuts: Sequence[float] = ()
-    states: Path | None = None  # file of Checkpoints
-    log: Path | None = None  # table of what the eye went through, CSV
-    plot: Path | None = None
-    video: Path | None = None
-    reflection: Reflection = "lambert"
-    gamma: float = TEXTURE_GAMMA
-    purposes: Sequence[str] = ("render",)
-    mask: Sequence[str] = ()
-    variants: Sequence[str] = ()  # PRIM:SET=NAME each
-    level: int = 0  # refinements of subdivision cages and curves
-    session_layer: Path | None = None
-    settings: str | None = None  # path of a RenderSettings prim
-    default_sky: bool = True
-    sky_visible: bool = False
-    samples: int = 1  # a pixel
-    shadows: bool = True
-    lights: LightMode = "auto"
-    sky_samples: int = 0  # directions in which the sky may be hidden; 0: it is seen everywhere
-    half: bool = False
-    compression: Compression = "zip"
-    resume: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +55,7 @@ class Frame:
     files: tuple[Path, ...] = ()
     skipped: bool = False
     light_error: float = 0.0  # bound of merging lamps (HdrRenderer.light_error); 0: each alone
+    layers: Mapping[str, npt.NDArray[np.float32]] = field(default_factory=dict)  # (h, w)
 
 
 class Renderer:
@@ -167,22 +129,62 @@ class Renderer:
         """Free what is on the GPU."""
         if self.eye is not None:
             self.eye.release()
+        self.hdr.release()
+        self.hdr.programs.release()
 
     def _frame(self, time: float) -> Frame:
         width, height = self.size
         camera = self.reader.camera(self.camera_path, time, width / height, self.settings.conform)
         self._check_camera(camera)
         scene = self.reader.read(time, camera, sky_visible=self.job.sky_visible)
+        rods = self._rods(scene)
         texture = self.hdr.render(scene)
         self.textures.publish()
-        moment, ldr = None, None
+        hdr, moment, ldr = self.hdr.read(), None, None
         if self.eye is not None and self.viewing is not None:
-            parameters = self._parameters(self.viewing.operator, camera)
-            sight = Sight(self.seconds(time), time, field_of_view(camera), parameters)
-            shown = self.eye.show(texture, sight)
+            sight = self._sight(self.viewing, scene, camera, time)
+            if rods is not None and self.viewing.night_colour:
+                texture = self.eye.upload(with_rods(hdr, rods))
+                shown = self.eye.show(texture, replace(sight, rods=True), top_first=True)
+            else:
+                shown = self.eye.show(texture, sight)
             moment, ldr = shown.moment, shown.picture
-        error = self.hdr.light_error
-        return Frame(time, self.hdr.read(), ldr, moment, camera, light_error=error)
+        error, layers = self.hdr.light_error, self._layers(hdr, rods)
+        return Frame(time, hdr, ldr, moment, camera, light_error=error, layers=layers)
+
+    def _sight(self, viewing: Viewing, scene: RenderScene, camera: Camera, time: float) -> Sight:
+        """What the eye has to know of a frame; of lamps beside it, where it is dazzled."""
+        return Sight(
+            self.seconds(time),
+            time if math.isfinite(time) else 0.0,
+            field_of_view(camera),
+            self._parameters(viewing.operator, camera),
+            eye_illuminance(scene) if viewing.glare is not None else None,
+        )
+
+    def _rods(self, scene: RenderScene) -> npt.NDArray[np.float32] | None:
+        """Scotopic luminance (h, w) by a frame of its own; None where no lamp states its S/P.
+
+        Nor where nobody asks for it.
+        """
+        job, viewing = self.job, self.viewing
+        wanted = job.scotopic or job.mesopic or (viewing is not None and viewing.night_colour)
+        second = scotopic_scene(scene) if wanted else None
+        if second is None:
+            return None
+        self.hdr.render(second)
+        return scotopic(self.hdr.read()).astype(np.float32)
+
+    def _layers(
+        self, hdr: npt.NDArray[np.float32], rods: npt.NDArray[np.float32] | None
+    ) -> dict[str, npt.NDArray[np.float32]]:
+        """What the job wants beside RGB; without ``rods`` by the colours of the frame."""
+        layers = {}
+        if self.job.scotopic:
+            layers["scotopic.Y"] = scotopic(hdr).astype(np.float32) if rods is None else rods
+        if self.job.mesopic:
+            layers["mesopic.Y"] = mesopic_layer(hdr, rods)
+        return layers
 
     def _check_camera(self, camera: Camera) -> None:
         """A camera that sees nothing would give black frames, silently."""
@@ -209,7 +211,15 @@ class Renderer:
             if not reads_screen(operator, job.parameters):
                 text = f"display peak and black are recorded; {operator.name} does not read them"
                 self.report.add(Kind.DROPPED, "display-unused", SourceRef(job.stage), "", text)
-        return Viewing(operator, job.parameters, job.observer, screen)
+        return Viewing(
+            operator,
+            job.parameters,
+            job.observer,
+            screen,
+            job.glare,
+            job.acuity,
+            job.night_colour,
+        )
 
     def _parameters(self, operator: Operator, camera: Camera) -> dict[str, Any]:
         """The user's, else the stage's for this operator, else the camera's exposure."""
@@ -343,7 +353,13 @@ def _write(renderer: Renderer, frame: Frame, writer: Writer) -> None:
             text = f"{clipped} pixels are clipped at 65504 cd/m2, where half floats end"
             renderer.report.add(Kind.CLAMPED, "half-clipped", SourceRef(path), "", text)
         writer.submit(
-            write_exr, path, frame.hdr, header, half=job.half, compression=job.compression
+            write_exr,
+            path,
+            frame.hdr,
+            header,
+            half=job.half,
+            compression=job.compression,
+            layers=frame.layers,
         )
     if job.png is not None and frame.ldr is not None:
         writer.submit(write_png, frame_path(job.png, frame.time), frame.ldr)

@@ -30,17 +30,27 @@ from hdrusd.colour import (
     to_rec2020,
 )
 from hdrusd.course import Course
-from hdrusd.eye.foveal import default_field
+from hdrusd.eye.acuity import acuity_blur
+from hdrusd.eye.foveal import Foveal, default_field
 from hdrusd.eye.observer import Observer
+from hdrusd.eye.scotopic import TINT, night_colour, scotopic, white_relative
 from hdrusd.eye.screen import Screen
+from hdrusd.glare.model import GlareModel
+from hdrusd.glare.pyramid import pyramid
+from hdrusd.gpu.glare import GlarePass
 from hdrusd.gpu.ldr import ToneMapper, deep
 from hdrusd.gpu.measure import Measurer
 from hdrusd.gpu.program import Programs
+from hdrusd.gpu.vision import AcuityPass
 from hdrusd.tonemap.falsecolour import OPERATOR as FALSE_COLOUR
+from hdrusd.tonemap.falsecolour import PALETTES
 from hdrusd.tonemap.legend import SMALLEST, paint_legend
 from hdrusd.tonemap.operator import Moment, Need, Operator, Parameters, statistics
 
 Array = npt.NDArray[Any]
+
+#: Shares of the colours' fading and of the blue shift (eye.scotopic.night_colour).
+NIGHT = (1.0, TINT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +61,9 @@ class Viewing:
     parameters: Parameters = field(default_factory=dict)
     observer: Observer = field(default_factory=Observer)
     screen: Screen = field(default_factory=Screen)
+    glare: GlareModel | None = None
+    acuity: bool = False
+    night_colour: bool = False
 
     def moment(self, parameters: Parameters | None = None) -> Moment:
         """A frame seen so, not yet measured; ``parameters`` in place of one's own."""
@@ -64,11 +77,13 @@ class Viewing:
             "parameters": self.operator.settings(self.parameters),
             "observer": asdict(self.observer),
             "screen": asdict(self.screen),
+            "glare": self.glare.name if self.glare is not None else None,
         }
 
     def needs(self, moment: Moment) -> Need:
         """What has to be measured of a frame."""
-        return self.operator.needs(moment.parameters)
+        need = self.operator.needs(moment.parameters)
+        return need | Need.FOVEAL if self.acuity else need
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,12 +92,16 @@ class Sight:
 
     ``time`` in s, ``frame`` its number; ``field``: width and height in degrees, None where the
     camera is unknown; ``parameters`` of the operator where they are this frame's own.
+    ``lamps`` (n, 6) are outside the frame and dazzle all the same (glare/veil.py). ``rods``: the
+    frame's fourth channel is what scotopic luminance is times that of its RGB (decision 19).
     """
 
     time: float = 0.0
     frame: float = 0.0
     field: tuple[float, float] | None = None
     parameters: Parameters | None = None
+    lamps: Array | None = None
+    rods: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,25 +122,52 @@ class Eye:
         self.course = course
         self.mapper = ToneMapper(ctx, programs)
         self.measurer = Measurer(ctx, programs)
+        self._glare = GlarePass(ctx, programs)
+        self._acuity = AcuityPass(ctx, programs)
 
     def see(self, hdr: moderngl.Texture, sight: Sight, *, top_first: bool = False) -> Moment:
         """Adapt to an RGB(A) float texture in cd/m2, without a picture of it."""
-        return self._adapt(hdr, sight, top_first)
+        return self._adapt(self._veiled(hdr, sight, top_first), sight, top_first)
 
     def show(self, hdr: moderngl.Texture, sight: Sight, *, top_first: bool = False) -> Shown:
         """Adapt to a texture in cd/m2, and the picture of it."""
-        moment = self._adapt(hdr, sight, top_first)
-        picture = self.mapper.apply(hdr, self.viewing.operator, moment, top_first=top_first)
-        add_legend(picture, self.viewing.operator, moment)
+        viewing = self.viewing
+        veiled = self._veiled(hdr, sight, top_first)
+        moment = self._adapt(veiled, sight, top_first)
+        sharp = veiled
+        if (
+            viewing.acuity
+            and moment.statistics is not None
+            and moment.statistics.foveal is not None
+        ):
+            sharp = self._acuity.apply(veiled, moment.statistics.foveal, top_first=top_first)
+        night = NIGHT if viewing.night_colour else None
+        picture = self.mapper.apply(
+            sharp, viewing.operator, moment, night=night, rods=sight.rods, top_first=top_first
+        )
+        add_legend(picture, viewing.operator, moment)
         return Shown(picture, moment)
 
-    def upload(self, rgb: npt.NDArray[np.float32]) -> moderngl.Texture:
-        """A frame (h, w, 3), top row first, as a texture whose top row is first."""
-        return self.mapper.upload(rgb)
+    def upload(self, frame: npt.NDArray[np.float32]) -> moderngl.Texture:
+        """A frame (h, w, 3 or 4), top row first, as a texture whose top row is first."""
+        if self.viewing.acuity and frame.shape[2] == 3:  # AcuityPass wants four channels
+            frame = np.concatenate([frame, np.ones_like(frame[..., :1])], axis=-1)
+        return self.mapper.upload(frame)
 
     def release(self) -> None:
         """Free what is on the GPU."""
-        self.mapper.release()
+        for part in (self.mapper, self.measurer, self._glare, self._acuity):
+            part.release()
+
+    def _veiled(self, hdr: moderngl.Texture, sight: Sight, top_first: bool) -> moderngl.Texture:
+        viewing = self.viewing
+        if viewing.glare is None:
+            return hdr
+        angles = sight.field or default_field(*hdr.size)
+        lamps = sight.lamps
+        if lamps is not None and top_first:
+            lamps = lamps * np.array([1.0, -1.0, 1.0, 1.0, 1.0, 1.0])
+        return self._glare.veil(hdr, angles, viewing.glare, viewing.observer, lamps)
 
     def _adapt(self, hdr: moderngl.Texture, sight: Sight, top_first: bool) -> Moment:
         moment = self.viewing.moment(sight.parameters)
@@ -138,24 +184,60 @@ class ReferenceEye:
         self.viewing = viewing
         self.course = course
 
-    def see(self, rgb: npt.ArrayLike, sight: Sight) -> Moment:
-        """Adapt to a frame (h, w, 3) in cd/m2, without a picture of it."""
-        return self._adapt(clean(rgb), sight)
+    def see(self, frame: npt.ArrayLike, sight: Sight) -> Moment:
+        """Adapt to a frame (h, w, 3 or 4) in cd/m2, without a picture of it."""
+        return self._adapt(self._veiled(clean(frame), sight), sight)
 
-    def show(self, rgb: npt.ArrayLike, sight: Sight) -> Shown:
+    def show(self, frame: npt.ArrayLike, sight: Sight) -> Shown:
         """Adapt to a frame, and the picture of it."""
-        veiled = clean(rgb)
-        moment = self._adapt(veiled, sight)
-        operator = self.viewing.operator
-        picture = encode(operator.apply(veiled, moment=moment), operator, moment.screen)
+        viewing, operator = self.viewing, self.viewing.operator
+        sharp = self._veiled(clean(frame), sight)
+        moment = self._adapt(sharp, sight)
+        if (
+            viewing.acuity
+            and moment.statistics is not None
+            and moment.statistics.foveal is not None
+        ):
+            sharp = acuity_blur(sharp, moment.statistics.foveal)
+        rgb = sharp[..., :3]
+        if viewing.night_colour:
+            share = sharp[..., 3] if sight.rods else 1.0
+            rgb = night_colour(rgb, share * white_relative(scotopic(rgb)), *NIGHT)
+        picture = encode(operator.apply(rgb, moment=moment), operator, moment.screen)
         add_legend(picture, operator, moment)
         return Shown(picture, moment)
 
-    def _adapt(self, rgb: Array, sight: Sight) -> Moment:
+    def _veiled(self, frame: Array, sight: Sight) -> Array:
+        viewing = self.viewing
+        if viewing.glare is None:
+            return frame
+        size = frame.shape[1], frame.shape[0]
+        angles = sight.field or default_field(*size)
+        plan = pyramid(viewing.glare, viewing.observer, size, angles)
+        veiled = plan.paint(frame[..., :3], sight.lamps)
+        return np.concatenate([veiled, frame[..., 3:]], axis=-1)
+
+    def _adapt(self, frame: Array, sight: Sight) -> Moment:
         moment = self.viewing.moment(sight.parameters)
+        rgb = frame[..., :3]
         angles = sight.field or default_field(rgb.shape[1], rgb.shape[0])
         stats = statistics(rgb, need, angles) if (need := self.viewing.needs(moment)) else None
         return self.course.advance(replace(moment, statistics=stats), sight.time, sight.frame)
+
+
+def _foveal(moment: Moment) -> Foveal:
+    stats = moment.statistics
+    assert stats is not None, "Viewing.needs asks for it"
+    assert stats.foveal is not None, "Viewing.needs asks for it"
+    return stats.foveal
+
+
+def with_rods(rgb: npt.ArrayLike, rods: npt.ArrayLike) -> npt.NDArray[np.float32]:
+    """A frame (h, w, 3) with what corrects its scotopic luminance to ``rods`` (h, w), cd/m2."""
+    rgb = np.asarray(rgb, np.float32)
+    guessed = scotopic(rgb)
+    share = np.divide(rods, guessed, out=np.ones_like(guessed), where=guessed > 0.0)
+    return np.concatenate([rgb, share[..., None].astype(np.float32)], axis=-1)
 
 
 def reads_screen(operator: Operator, parameters: Parameters) -> bool:
@@ -198,5 +280,11 @@ def add_legend(picture: Array, operator: Operator, moment: Moment) -> None:
     """The cd/m2 scale on a false colour picture that has room for it, in place."""
     room = all(have >= need for have, need in zip(picture.shape, SMALLEST, strict=False))
     if operator.name == FALSE_COLOUR.name and room and picture.dtype == np.uint8:
-        settings = moment.parameters
-        paint_legend(picture, float(settings["scale"] or 0), float(settings["decades"] or 0))
+        scale = operator.uniforms(moment)
+        paint_legend(
+            picture,
+            scale["falsecolour_scale"],
+            scale["falsecolour_decades"],
+            PALETTES[int(scale["falsecolour_kind"])],
+            scale["falsecolour_steps"],
+        )

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import moderngl
 import numpy as np
 import pytest
 from hypothesis import settings
@@ -29,11 +30,13 @@ def _strict_numpy() -> Iterator[None]:
 @pytest.fixture(scope="session")
 def _context() -> Any:
     try:
-        return create_context()
+        context = create_context()
     except ContextError as error:
         if os.environ.get("HDRUSD_REQUIRE_GL") == "1":
             pytest.fail(str(error))
         pytest.skip(str(error))
+    context.gc_mode = "context_gc"
+    return context
 
 
 @pytest.fixture
@@ -49,6 +52,12 @@ def gl(_context: Any) -> Iterator[Any]:
         yield _context
     with _context:
         assert _context.error == "GL_NO_ERROR"
+        _context.extra["framebuffer"].use()
+        # What a test let go of without release(); what it released is listed too.
+        while _context.objects:
+            thing = _context.objects.popleft()
+            if not isinstance(thing, moderngl.InvalidObject):
+                thing.release()
 
 
 @pytest.fixture

@@ -15,7 +15,8 @@ from converted import lights, opened, run, sidecar
 from pxr import Sdf, Usd, UsdGeom, UsdLux
 
 from hdrusd.convert import Result
-from hdrusd.render import Job, render_sequence
+from hdrusd.job import Job
+from hdrusd.render import render_sequence
 from hdrusd.report import Report
 from hdrusd.usd.fixtures import PlacedMesh, free_from
 from hdrusd.usd.light import read_light

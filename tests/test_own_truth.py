@@ -24,7 +24,8 @@ from truth_stages.closed_forms import (
     shaded,
 )
 
-from hdrusd.render import Job, render_sequence
+from hdrusd.job import Job
+from hdrusd.render import render_sequence
 from hdrusd.report import Report
 
 #: Interpolation in float32 over a triangle and some forty operations; half floats of 8-bit

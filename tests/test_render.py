@@ -12,7 +12,8 @@ from stage_text import CAMERA, GROUND, SKY, panel, write_stage
 
 from hdrusd.errors import InputError
 from hdrusd.images import read_exr
-from hdrusd.render import Frame, Job, render_sequence
+from hdrusd.job import Job
+from hdrusd.render import Frame, render_sequence
 from hdrusd.report import Kind, Report
 
 GREEN = (0.0, 10.0, 0.0)

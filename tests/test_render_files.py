@@ -14,8 +14,9 @@ from stage_text import GROUND, SKY, write_stage
 
 from hdrusd.display import Writer
 from hdrusd.images import read_exr, read_image, write_png
+from hdrusd.job import Job
 from hdrusd.photometry.lightcut import EPSILON
-from hdrusd.render import Frame, Job, Renderer, render_sequence
+from hdrusd.render import Frame, Renderer, render_sequence
 from hdrusd.report import Kind, Report
 from hdrusd.tonemap.operator import OPERATORS
 

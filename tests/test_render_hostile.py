@@ -10,7 +10,8 @@ import pytest
 from stage_text import CAMERA, GROUND, SKY, panel, write_stage
 
 from hdrusd.errors import InputError
-from hdrusd.render import Frame, Job, render_sequence
+from hdrusd.job import Job
+from hdrusd.render import Frame, render_sequence
 from hdrusd.report import Report
 
 LAMP = """\

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from stage_text import GROUND, SKY, write_stage
 
-from hdrusd.render import Job, render_sequence
+from hdrusd.job import Job
+from hdrusd.render import render_sequence
 from hdrusd.report import Report
 
 #: 1000 cd, 2 m above the middle of the ground.

@@ -10,7 +10,8 @@ import pytest
 from builders import png
 from stage_text import CAMERA
 
-from hdrusd.render import Job, Renderer
+from hdrusd.job import Job
+from hdrusd.render import Renderer
 from hdrusd.report import Report
 
 STAGE = """#usda 1.0

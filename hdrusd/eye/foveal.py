@@ -23,6 +23,13 @@ Array = npt.NDArray[Any]
 #: Degrees that the larger side of a frame has where its camera is unknown (pcond's).
 DEFAULT_FIELD = 40.0
 
+#: cd/m2 that a sample must exceed to count: less than any night sky has, so it is no sky but
+#: nothing. The logarithm of a void would decide what the eye adapts to.
+VOID = 1e-5
+
+#: cd/m2 that the eye is adapted to where there is nothing but void.
+DARKEST = 1e-6
+
 #: Most samples along a side: 104 degrees, and by then a sample at the edge is 0.4 degrees wide.
 MOST = 256
 
@@ -153,12 +160,14 @@ def gaze_weights(size: tuple[int, int], field: tuple[float, float], spread: floa
     return np.exp(-0.5 * (theta / spread) ** 2)
 
 
-def log_mean(y: npt.ArrayLike, weights: npt.ArrayLike | None = None, least: float = 1e-6) -> float:
-    """Weighted geometric mean of max(y, ``least``): the luminance that an eye adapts to, cd/m2.
+def log_mean(y: npt.ArrayLike, weights: npt.ArrayLike | None = None) -> float:
+    """exp of the weighted mean of ln luminance: what the eye adapts to, cd/m2.
 
-    Of samples and weights of one shape; 1 each without weights.
+    Of samples and weights of one shape; 1 each without weights. Samples of VOID and less show
+    nothing that was modelled, and do not count; a frame of nothing else is DARKEST.
     """
-    logs = np.log(np.maximum(np.asarray(y, np.float64), least))
-    return math.exp(
-        float(np.average(logs, weights=None if weights is None else np.asarray(weights)))
-    )
+    y = np.asarray(y, np.float64)
+    w = np.where(y > VOID, 1.0 if weights is None else np.asarray(weights, np.float64), 0.0)
+    if not w.any():
+        return DARKEST
+    return math.exp(float(np.average(np.log(np.maximum(y, VOID)), weights=w)))

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -150,10 +151,11 @@ def desensitisation(receptor: Receptor, state: Adaptation, trolands: float) -> f
     return float(10.0 ** (_DESENSITISATION * excess))
 
 
+@lru_cache(maxsize=16)  # a frame asks several times for the same
 def equivalent(receptor: Receptor, state: Adaptation) -> float:
     """The steady light, td, that has the same sigma; within 1e-9 to 1e9 td.
 
-    sigma rises with steady light, so it is found by bisection of ln I.
+    Sigma rises with steady light, so it is found by bisection of ln I.
     """
     wanted = half_saturation(receptor, state)
     low, high = math.log(_DIMMEST), math.log(_BRIGHTEST)

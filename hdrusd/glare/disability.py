@@ -73,7 +73,7 @@ def visibility_level(
     ``veil`` lies over both and leaves their difference as it is.
     """
     difference = np.asarray(target, np.float64) - np.asarray(background, np.float64)
-    behind = np.asarray(background, np.float64) + veil
+    behind = np.asarray(background, np.float64) + np.asarray(veil, np.float64)
     lighter = threshold(behind, size, time, age)
     darker = threshold(behind, size, time, age, negative=True)
     return difference / np.where(difference < 0.0, darker, lighter)
@@ -81,29 +81,29 @@ def visibility_level(
 
 def _ricco_weber(lb: Array) -> tuple[Array, Array]:
     """Roots of the luminous flux and of the luminance that limit small and large targets."""
-    l = np.log10(lb)
+    log_lb = np.log10(lb)
     ranges = [lb >= 0.6, lb > 0.00418]
     flux = np.select(
         ranges,
         [
             np.log10(4.1925 * lb**0.1556) + 0.1684 * lb**0.5867,
-            10.0 ** (-0.072 + 0.3372 * l + 0.0866 * l**2),
+            10.0 ** (-0.072 + 0.3372 * log_lb + 0.0866 * log_lb**2),
         ],
-        10.0 ** (0.028 + 0.173 * l),
+        10.0 ** (0.028 + 0.173 * log_lb),
     )
     luminance = np.select(
         ranges,
-        [0.05946 * lb**0.466, 10.0 ** (-1.256 + 0.319 * l)],
-        10.0 ** (-0.891 + 0.5275 * l + 0.0227 * l**2),
+        [0.05946 * lb**0.466, 10.0 ** (-1.256 + 0.319 * log_lb)],
+        10.0 ** (-0.891 + 0.5275 * log_lb + 0.0227 * log_lb**2),
     )
     return flux, luminance
 
 
 def _polarity(lb: Array, alpha: Array, delta: Array) -> Array:
     """Factor for dark targets, of backgrounds above 0.004 cd/m2."""
-    l = np.log10(lb)
+    log_lb = np.log10(lb)
     c = np.where(lb >= 0.1, 0.125, 0.075)
-    m = 10.0 ** (-(10.0 ** -(c * (l + 1.0) ** 2 + 0.0245)))
+    m = 10.0 ** (-(10.0 ** -(c * (log_lb + 1.0) ** 2 + 0.0245)))
     factor = 1.0 - m * alpha ** (-0.6 * lb**-0.1488) / (2.4 * delta)
     return np.where(lb > 0.004, factor, 1.0)
 

@@ -28,7 +28,7 @@ def guth_index(tau: npt.ArrayLike, sigma: npt.ArrayLike) -> Array:
     tau, sigma = np.asarray(tau, np.float64), np.asarray(sigma, np.float64)
     first = (35.2 - 0.31889 * tau - 1.22 * np.exp(-2.0 * tau / 9.0)) * 1e-3 * sigma
     second = (21.0 + 0.26667 * tau - 0.002963 * tau**2) * 1e-5 * sigma**2
-    return np.asarray(np.minimum(np.exp(np.minimum(first + second, math.log(_MOST))), _MOST))
+    return np.asarray(np.minimum(np.exp(np.minimum(first + second, 50.0)), _MOST))
 
 
 def iwata_index(horizontal: npt.ArrayLike, vertical: npt.ArrayLike) -> Array:
@@ -48,24 +48,10 @@ def position_index(direction: npt.ArrayLike) -> Array:
     return np.where(d[..., 1] >= 0.0, guth_index(tau, sigma), iwata_index(across, down))
 
 
-def pixel_solid_angles(size: tuple[int, int], field: tuple[float, float]) -> Array:
-    """sr (h, w) of the pixels of a perspective picture of (w, h) pixels: area cos^3 / f^2.
-
-    ``field``: its width and height in degrees.
-    """
-    right, up = (math.tan(math.radians(a) / 2.0) for a in field)
-    x, y = (
-        half * ((2 * np.arange(n) + 1) / n - 1.0)
-        for half, n in zip((right, up), size, strict=True)
-    )
-    area = 4.0 * right * up / (size[0] * size[1])
-    return np.asarray(area * (1.0 + x[None, :] ** 2 + y[:, None] ** 2) ** -1.5)
-
-
 def _squares(luminance: npt.ArrayLike, solid_angle: npt.ArrayLike, index: npt.ArrayLike) -> Array:
     """L^2 omega / P^2 of sources, cd^2/m4 sr."""
-    l, p = np.asarray(luminance, np.float64), np.asarray(index, np.float64)
-    return np.asarray(l**2 * np.asarray(solid_angle, np.float64) / p**2)
+    ratio = np.asarray(luminance, np.float64) / np.asarray(index, np.float64)
+    return np.asarray(ratio**2 * np.asarray(solid_angle, np.float64))
 
 
 def ugr(

@@ -7,7 +7,7 @@ level spreads a pixel over a Gaussian; blurred by (1, 2, 1) / 4 before, over a w
 
     sigma^2 = (4^k - 1) / 2   and   4^k - 1 / 2   pixels^2.
 
-f_v is fitted by such Gaussians with weights that are not negative (``weights``: within 1 % from
+f_v is fitted by such near-Gaussians with weights that are not negative (``weights``: within 1 % from
 NARROWEST to WIDEST degrees, where pixels are small enough), and levels stand for it from fine
 to coarse:
 
@@ -16,6 +16,10 @@ to coarse:
 - what is wider is added at the texels of ``last`` by a dense matrix, with the true angle and
   solid angle of each texel of a perspective picture: the rest of the Gaussians up to WIDEST
   degrees, and what all drawn levels leave of f_v beyond.
+
+Away from the middle of a perspective picture a pixel is s = cos^1.5(angle from the axis) as
+wide, in the mean of both directions. So the fit is made for NODES values of s, and each texel
+takes the weights for its own, in between.
 
 A fourth channel, 1 in the frame, goes the same way and becomes the share S m that leaves a
 pixel and arrives in the frame (veil.py).
@@ -43,10 +47,17 @@ NARROWEST, WIDEST = 0.02, 8.0
 MARGIN = 2
 
 #: Largest relative error of the fit that a first level may have.
-_TOLERANCE = 0.01
+_TOLERANCE = 0.04
 
 #: Most texels of the level that the dense matrix works on.
 _DENSE = 2500
+
+#: Excess kurtosis of what a level spreads a pixel over, as it is (in the end a B-spline of the
+#: fifth degree) and blurred.
+EXCESS = (-0.2, -0.3)
+
+#: Values of s, even from 1 to that in the corners, for which weights are fitted.
+NODES = 8
 
 #: Cells of the table of the wide part, even in the root of the chord between directions.
 _CELLS = 1 << 15
@@ -64,15 +75,17 @@ def nonnegative_least_squares(matrix: Array, wanted: Array) -> Array:
     C. L. Lawson and R. J. Hanson, Solving Least Squares Problems, 1974, chapter 23.
     """
     columns = matrix.shape[1]
+    # Normal equations: neighbouring Gaussians differ enough for them, and they are small.
+    normal, right = matrix.T @ matrix, matrix.T @ wanted
     active, x = np.zeros(columns, bool), np.zeros(columns)
     for _ in range(10 * columns):
-        gain = np.where(active, -np.inf, matrix.T @ (wanted - matrix @ x))
+        gain = np.where(active, -np.inf, right - normal @ x)
         if gain.max(initial=-np.inf) <= 1e-10:
             break
         active[np.argmax(gain)] = True
         while active.any():
             free = np.zeros(columns)
-            free[active] = np.linalg.lstsq(matrix[:, active], wanted, rcond=None)[0]
+            free[active] = np.linalg.solve(normal[np.ix_(active, active)], right[active])
             below = active & (free <= 0.0)
             if not below.any():
                 x = free
@@ -85,47 +98,63 @@ def nonnegative_least_squares(matrix: Array, wanted: Array) -> Array:
     return x
 
 
-def gaussians(theta: npt.ArrayLike, sigma: npt.ArrayLike) -> Array:
-    """(..., n) of unit Gaussians of ``sigma`` (n,) at ``theta`` (...), degrees; sr^-1."""
+def gaussians(theta: npt.ArrayLike, sigma: npt.ArrayLike, excess: npt.ArrayLike = 0.0) -> Array:
+    """(..., n) of unit Gaussians of ``sigma`` (n,) at ``theta`` (...), degrees; sr^-1.
+
+    ``excess`` (n,): the excess kurtosis along each axis, up to where the Gram-Charlier series,
+    in the mean over directions, falls below 0.
+    """
     s = np.radians(np.asarray(sigma, np.float64))
-    t = np.radians(np.asarray(theta, np.float64))[..., None]
-    return np.asarray(np.exp(-0.5 * (t / s) ** 2) / (2.0 * math.pi * s**2))
+    square = (np.radians(np.asarray(theta, np.float64))[..., None] / s) ** 2
+    series = 1.0 + np.asarray(excess) / 24.0 * (0.75 * square**2 - 6.0 * square + 6.0)
+    return np.asarray(np.exp(-0.5 * square) * np.maximum(series, 0.0) / (2.0 * math.pi * s**2))
 
 
 def fitted(
-    model: GlareModel, observer: Observer, pixel: float, sigma: npt.ArrayLike
+    model: GlareModel,
+    observer: Observer,
+    pixel: float,
+    sigma: npt.ArrayLike,
+    excess: npt.ArrayLike = 0.0,
 ) -> tuple[Array, float]:
-    """Weights (n,) of Gaussians of ``sigma`` (n,) degrees that stand for f_v, and their error.
+    """Weights (n,) of ``gaussians`` that stand for f_v, and their error.
 
     The relative error is least in squares over even steps of log theta, from NARROWEST, or half
     a pixel, to WIDEST; what is returned is the largest. ``pixel`` in degrees.
     """
     theta = np.geomspace(min(max(NARROWEST, 0.5 * pixel), 0.5 * WIDEST), WIDEST, 1200)
     wanted = kernel(model, observer, pixel, theta)
-    ratios = gaussians(theta, sigma) / wanted[:, None]
+    ratios = gaussians(theta, sigma, excess) / wanted[:, None]
     found = nonnegative_least_squares(ratios, np.ones(len(theta)))
     return found, float(np.max(np.abs(ratios @ found - 1.0)))
 
 
 @lru_cache(maxsize=64)
-def weights(
-    model: GlareModel, observer: Observer, pixel: float
-) -> tuple[int, tuple[tuple[float, float], ...]]:
-    """The first level, and of it and each following one the weights as it is and blurred.
-
-    ``pixel`` in degrees.
-    """
+def first_level(model: GlareModel, observer: Observer, pixel: float) -> tuple[int, int]:
+    """The first level for pixels of ``pixel`` degrees, and the number of levels from it on."""
     top = max(math.ceil(math.log2(3.0 / (1.12 * pixel))), 0) + 1
-    best = 0, np.zeros((top + 1, 2))
-    for first in range(top + 1):
-        sigma = sigmas(first, top + 1 - first) * pixel
-        counts = sigma > 0.0  # level 0 as it is spreads nothing
-        found = np.zeros(sigma.shape)
-        found[counts], error = fitted(model, observer, pixel, sigma[counts])
-        if first > 0 and error > _TOLERANCE:
+    first = 0
+    while first < top:
+        sigma = sigmas(first + 1, top - first) * pixel
+        excess = np.broadcast_to(EXCESS, sigma.shape)
+        if fitted(model, observer, pixel, sigma.ravel(), excess.ravel())[1] > _TOLERANCE:
             break
-        best = first, found
-    return best[0], tuple((float(own), float(blurred)) for own, blurred in best[1])
+        first += 1
+    return first, top + 1 - first
+
+
+def weights(model: GlareModel, observer: Observer, pixel: float, scale: float = 1.0) -> Array:
+    """(n, 2) weights of the first and each following level, as it is and blurred.
+
+    ``pixel`` in degrees, in the middle of the picture; ``scale``: how wide pixels are beside it.
+    """
+    first, levels = first_level(model, observer, pixel)
+    sigma = sigmas(first, levels) * pixel * scale
+    spreads = sigma > 0.0  # level 0 as it is does not
+    found = np.zeros(sigma.shape)
+    excess = np.broadcast_to(EXCESS, sigma.shape)[spreads]
+    found[spreads] = fitted(model, observer, pixel, sigma[spreads], excess)[0]
+    return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,20 +162,22 @@ class Pyramid:
     """What to draw for a model, an observer and a perspective picture of a size.
 
     ``size`` (w, h) pixels, ``field`` degrees. Levels ``first`` to ``last`` are drawn with
-    ``weights``, as they are and blurred. ``spread`` (n, n) float32: between the texels of
-    ``last`` and one more on every side, bottom row first. ``table``: the wide part of the
-    kernel by the root of the chord, sr^-1; empty where the model has no point spread.
-    ``rays`` (n, 3): unit vectors through those texels.
+    ``weights`` (NODES, levels, 2), as they are and blurred, the nodes being even in s from 1
+    to ``least``. ``spread`` (n, n) float32: between the texels of ``last`` and one more on
+    every side, bottom row first; ``rays`` (n, 3) are the unit vectors through them.
+    ``tables`` (NODES, cells): the wide part of the kernel by the root of the chord, sr^-1.
+    A model without a point spread has no weights and no tables.
     """
 
     size: tuple[int, int]
     field: tuple[float, float]
     first: int
     last: int
-    weights: tuple[tuple[float, float], ...]
+    least: float
+    weights: Array
     spread: Array
-    table: Array
     rays: Array
+    tables: Array
 
     def level_size(self, level: int) -> tuple[int, int]:
         """(w, h) of a level in texels, without its margin."""
@@ -158,9 +189,9 @@ class Pyramid:
         All with one texel of the margin; cd/m2 and the share of the frame.
         """
         out = self.spread @ np.asarray(texels, np.float32).reshape(-1, 4)
-        if lamps is not None and self.table.size:
+        if lamps is not None and self.tables.size:
             for rows in np.array_split(lamps, max(math.ceil(len(lamps) / 256), 1)):
-                spread = _looked_up(self.table, self.rays, rows[:, :3])
+                spread = _looked_up(self.tables, self.least, self.rays, rows[:, :3])
                 out[:, :3] += spread @ rows[:, 3:].astype(np.float32)
         return np.asarray(out.reshape(texels.shape))
 
@@ -187,11 +218,31 @@ class Pyramid:
         places, lights = [], []
         for y in range(3):
             for x in range(3):
-                places.append(centre + (x - 1, y - 1))
+                places.append(centre + np.array([x - 1, y - 1]))
                 lights.append(luminance * (share[x, :, 0] * share[y, :, 1])[:, None])
         texels = np.concatenate(places).astype(np.int64)
         inside = np.all((texels >= 0) & (texels < limits), axis=1)
         return texels[inside], np.concatenate(lights)[inside]
+
+    def plane_steps(self, level: int) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Of a level, at distance 1: the corner of the frame at (0, 0), and a texel's sides."""
+        across, down = plane(self.field)
+        texel = 2.0**level
+        return (-across, -down), (
+            2.0 * across * texel / self.size[0],
+            2.0 * down * texel / self.size[1],
+        )
+
+    def _weights_at(self, level: int, size: tuple[int, ...]) -> Array:
+        """(h, w, 2) for the texels of a level with its margin."""
+        x, y = (
+            corner + (np.arange(n) - MARGIN + 0.5) * step
+            for corner, step, n in zip(*self.plane_steps(level), size, strict=True)
+        )
+        scale = (1.0 + x[None, :] ** 2 + y[:, None] ** 2) ** -0.75
+        low, part = _between(scale, self.least)
+        drawn = self.weights[:, level - self.first]
+        return np.asarray(drawn[low] * (1.0 - part[..., None]) + drawn[low + 1] * part[..., None])
 
     def paint(self, picture: npt.ArrayLike, lamps: npt.ArrayLike | None = None) -> Array:
         """The veiled picture (h, w, 3) in cd/m2, top row first; lamps as in veil.py."""
@@ -209,12 +260,12 @@ class Pyramid:
             source = levels[k]
             if k < self.last:
                 veil = _enlarged(veil, source.shape[1::-1], 1, MARGIN)
-            if self.weights:
+            if self.weights.size:
                 if rows is not None:
                     place, light = self.splats(k, rows)
                     np.add.at(source[..., :3], (place[:, 1], place[:, 0]), light)
-                own, blurred = self.weights[k - self.first]
-                veil = veil + own * source + blurred * _blurred(source)
+                weight = self._weights_at(k, source.shape[1::-1])
+                veil = veil + weight[..., :1] * source + weight[..., 1:] * _blurred(source)
         veil = _enlarged(veil, self.size, self.first, 0)
         return np.asarray(((1.0 - veil[..., 3:]) * rgb + veil[..., :3])[::-1])
 
@@ -243,16 +294,26 @@ def pyramid(
         last += 1
     if model.psf is None:
         return _of_shares(model, size, field, last)
-    first, fit = weights(model, observer, pixel)
+    first, levels = first_level(model, observer, pixel)
     last = max(first, last)
-    drawn = (*fit, *[(0.0, 0.0)] * (last + 1 - first - len(fit)))[: last + 1 - first]
-    table = _wide_table(model, observer, pixel, last)
+    least = (1.0 + sum(half**2 for half in plane(field))) ** -0.75
+    scales = np.linspace(1.0, least, NODES)
+    fits = np.stack([weights(model, observer, pixel, scale) for scale in scales])
+    drawn = np.pad(fits, [(0, 0), (0, max(last + 1 - first - levels, 0)), (0, 0)])
+    tables = np.stack(
+        [
+            _wide_table(model, observer, pixel, scale, first, last, fit)
+            for scale, fit in zip(scales, fits, strict=True)
+        ]
+    )
     rays = _rays(size, field, last)
     texel = 4.0 * math.prod(plane(field)) / math.prod(size) * 4.0**last
     solid = (texel * np.abs(rays[:, 2]) ** 3).astype(np.float32)
     parts = np.array_split(rays, max(len(rays) // 256, 1))
-    spread = np.concatenate([_looked_up(table, part, rays) * solid for part in parts])
-    return Pyramid(size, field, first, last, drawn, spread, table, rays)
+    spread = np.concatenate([_looked_up(tables, least, part, rays) * solid for part in parts])
+    return Pyramid(
+        size, field, first, last, least, drawn[:, : last + 1 - first], spread, rays, tables
+    )
 
 
 def _of_shares(
@@ -262,40 +323,65 @@ def _of_shares(
     if model.shares is None:
         raise HdrusdError(f"glare model {model.name}: has neither point spread nor shares")
     rays = _rays(size, field, last)
-    # How much of the frame each texel holds: the fourth channel of the level.
-    row, column = (np.pad(np.ones((n, 1, 1)), _around(MARGIN)) for n in size)
+    # How much of the frame each holds: the fourth channel of the level.
+    along = [np.pad(np.ones(n), MARGIN) for n in size]
     for _ in range(last):
-        row, column = _halved(row), _halved(column)
-    middle = row.shape[1] // 2
-    across, down = (v[MARGIN - 1 : 1 - MARGIN, middle, 0] for v in (row, column))
+        along = [_halved_along(part, 0) for part in along]
+    across, down = (part[MARGIN - 1 : 1 - MARGIN] for part in along)
     inside = np.outer(down, across).ravel()
     spread = model.shares(rays @ rays.T, inside).astype(np.float32)
-    return Pyramid(size, field, last, last, (), spread, np.zeros(0, np.float32), rays)
+    none = np.zeros((NODES, 0))
+    return Pyramid(size, field, last, last, 1.0, none, spread, rays, none)
 
 
-def _wide_table(model: GlareModel, observer: Observer, pixel: float, last: int) -> Array:
-    """What levels up to ``last`` leave of the kernel, (_CELLS,) float32, sr^-1."""
+def _wide_table(
+    model: GlareModel,
+    observer: Observer,
+    pixel: float,
+    scale: float,
+    first: int,
+    last: int,
+    fit: Array,
+) -> Array:
+    """What levels up to ``last`` leave of the kernel, (_CELLS,) float32, sr^-1.
+
+    ``fit`` (n, 2): the weights of the first level and the following ones for that scale.
+    """
     chord = (math.sqrt(2.0) * (np.arange(_CELLS) + 0.5) / _CELLS) ** 2
     theta = np.degrees(2.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)))
-    first, fit = weights(model, observer, pixel)
-    sigma, weight = sigmas(first, len(fit)) * pixel, np.array(fit)
+    sigma = sigmas(first, len(fit)) * pixel * scale
     # Variance, degrees^2, that the texels of ``last`` add by being made and enlarged.
-    smooth = (4.0**last - 1.0) / 2.0 * pixel**2
+    smooth = (4.0**last - 1.0) / 2.0 * (pixel * scale) ** 2
     sums = []
-    for part, added in ((slice(None, last + 1 - first), 0.0), (slice(last + 1 - first, None), smooth)):
-        counts = weight[part] > 0.0
-        s = np.sqrt(sigma[part][counts] ** 2 - added)
-        sums.append(gaussians(theta, s) @ weight[part][counts])
+    drawn = np.arange(len(fit))[:, None] <= last - first
+    for part, added in ((drawn, 0.0), (~drawn, smooth)):
+        counts = part & (fit > 0.0)
+        variance = sigma[counts] ** 2 - added
+        # Variances add up, and so do excesses times their squares.
+        fourth = np.broadcast_to(EXCESS, fit.shape)[counts] * sigma[counts] ** 4
+        excess = (fourth - EXCESS[0] * added**2) / variance**2
+        sums.append(gaussians(theta, np.sqrt(variance), excess) @ fit[counts])
     # Of 1 / theta^2, smoothing by a variance makes 1 / (theta^2 - 2 variance).
     beyond = kernel(model, observer, pixel, np.sqrt(theta**2 + 2.0 * smooth)) - sums[0]
     return np.where(theta < WIDEST, sums[1], np.maximum(beyond, 0.0)).astype(np.float32)
 
 
-def _looked_up(table: Array, a: Array, b: Array) -> Array:
-    """(n, m) float32 of the table between unit vectors (n, 3) and (m, 3)."""
+def _between(scale: Array, least: float) -> tuple[Array, Array]:
+    """Of values of s: the node before each, and how far on it is towards the next, 0 to 1."""
+    place = np.clip((1.0 - scale) / max(1.0 - least, 1e-9), 0.0, 1.0) * (NODES - 1)
+    low = np.minimum(place.astype(np.int64), NODES - 2)
+    return low, place - low
+
+
+def _looked_up(tables: Array, least: float, a: Array, b: Array) -> Array:
+    """(n, m) float32 of the tables between unit vectors (n, 3), whose s counts, and (m, 3)."""
     root = np.sqrt(np.sqrt(np.maximum(2.0 - 2.0 * (a @ b.T), 0.0)))
-    cell = (root * (_CELLS / math.sqrt(2.0))).astype(np.int32)
-    return np.asarray(table[np.minimum(cell, _CELLS - 1)])
+    cell = np.minimum((root * (_CELLS / math.sqrt(2.0))).astype(np.int32), _CELLS - 1)
+    low, part = _between(np.abs(a[:, 2]) ** 1.5, least)
+    cell += low[:, None].astype(np.int32) * _CELLS
+    share = part[:, None].astype(np.float32)
+    flat = tables.ravel()
+    return np.asarray(flat.take(cell) * (1.0 - share) + flat.take(cell + _CELLS) * share)
 
 
 def _level_size(size: tuple[int, int], level: int) -> tuple[int, int]:
@@ -306,9 +392,7 @@ def _rays(size: tuple[int, int], field: tuple[float, float], level: int) -> Arra
     """Unit vectors (n, 3) through the texels of a level and one more around, bottom row first."""
     x, y = (
         half * (2.0 * (np.arange(-1, texels + 1) + 0.5) * 2.0**level / pixels - 1.0)
-        for half, texels, pixels in zip(
-            plane(field), _level_size(size, level), size, strict=True
-        )
+        for half, texels, pixels in zip(plane(field), _level_size(size, level), size, strict=True)
     )
     grid = np.stack([*np.meshgrid(x, y), np.full((len(y), len(x)), -1.0)], axis=-1).reshape(-1, 3)
     return np.asarray(grid / np.linalg.norm(grid, axis=1, keepdims=True))
@@ -319,16 +403,20 @@ def _around(texels: int) -> list[tuple[int, int]]:
 
 
 def _halved(level: Array) -> Array:
-    """The next level of one with its MARGIN, with its own; by (1, 3, 3, 1) / 8, dark beyond."""
-    for axis in (0, 1):
-        texels = (level.shape[axis] - 2 * MARGIN + 1) // 2 + 2 * MARGIN
-        # Texel i is made of 2 i - 1 to 2 i + 2, counted from the frame's edge.
-        low = 2 * MARGIN - MARGIN + 1
-        high = 2 * texels + 2 - low - level.shape[axis]
-        padded = np.pad(level, [(low, high) if a == axis else (0, 0) for a in range(3)])
-        taps = [np.take(padded, np.arange(texels) * 2 + i, axis) for i in range(4)]
-        level = 0.125 * (taps[0] + taps[3]) + 0.375 * (taps[1] + taps[2])
-    return level
+    """The next level of one with its MARGIN, with its own."""
+    return _halved_along(_halved_along(level, 0), 1)
+
+
+def _halved_along(level: Array, axis: int) -> Array:
+    """By (1, 3, 3, 1) / 8 along an axis, dark beyond."""
+    texels = (level.shape[axis] - 2 * MARGIN + 1) // 2 + 2 * MARGIN
+    # Texel i is made of 2 i - 1 to 2 i + 2, counted from the frame's edge.
+    low = MARGIN + 1
+    high = 2 * texels + 2 - low - level.shape[axis]
+    pads = [(low, high) if a == axis else (0, 0) for a in range(level.ndim)]
+    padded = np.pad(level, pads)
+    taps = [np.take(padded, np.arange(texels) * 2 + i, axis) for i in range(4)]
+    return np.asarray(0.125 * (taps[0] + taps[3]) + 0.375 * (taps[1] + taps[2]))
 
 
 def _blurred(level: Array) -> Array:

@@ -27,6 +27,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.errors import HdrusdError
+from hdrusd.eye.foveal import directions
 from hdrusd.eye.observer import Observer
 from hdrusd.glare.model import Array, GlareModel, angle
 
@@ -35,6 +36,9 @@ _CORE, _CORE_PIXELS = 0.1, 1.2
 
 #: Degrees beyond which no light is scattered towards what is seen.
 LAST = 100.0
+
+#: Degrees that a perspective picture may be wide or high.
+FIELDS = (1e-3, 179.0)
 
 #: A row of lamps: direction, and lx per channel.
 LAMP = 6
@@ -56,8 +60,11 @@ def pixel_angle(size: tuple[int, int], field: tuple[float, float]) -> float:
 
 def plane(field: tuple[float, float]) -> tuple[float, float]:
     """Half the width and height at distance 1 of a field in degrees; raises HdrusdError."""
-    if not all(0.0 < a < 180.0 for a in field):
-        raise HdrusdError(f"field of view: {field[0]:g} x {field[1]:g} degrees; want 0 to 180")
+    low, high = FIELDS
+    if not all(low <= a <= high for a in field):
+        raise HdrusdError(
+            f"field of view: {field[0]:g} x {field[1]:g} degrees; want {low:g} to {high:g}"
+        )
     across, down = (math.tan(math.radians(a) / 2.0) for a in field)
     return across, down
 
@@ -69,9 +76,7 @@ def point_spread(model: GlareModel, theta: npt.ArrayLike, observer: Observer) ->
     return model.psf(theta, observer)
 
 
-def kernel(
-    model: GlareModel, observer: Observer, pixel: float, theta: npt.ArrayLike
-) -> Array:
+def kernel(model: GlareModel, observer: Observer, pixel: float, theta: npt.ArrayLike) -> Array:
     """f_v at ``theta`` degrees (...), sr^-1, for pixels of ``pixel`` degrees; 0 beyond LAST."""
     theta = np.asarray(theta, np.float64)
     spread = point_spread(model, np.hypot(theta, core(pixel)), observer)
@@ -87,13 +92,10 @@ def scattered(model: GlareModel, observer: Observer, pixel: float) -> float:
     return float(np.trapezoid(ring * np.radians(t), np.log(t)))
 
 
-def directions(size: tuple[int, int], field: tuple[float, float]) -> Array:
-    """Unit vectors (h, w, 3) through the pixels of a perspective picture, top row first."""
-    across, down = plane(field)
-    x = across * ((2 * np.arange(size[0]) + 1) / size[0] - 1.0)
-    y = down * (1.0 - (2 * np.arange(size[1]) + 1) / size[1])
-    rays = np.stack([*np.meshgrid(x, y), np.full(size[::-1], -1.0)], axis=-1)
-    return np.asarray(rays / np.linalg.norm(rays, axis=-1, keepdims=True))
+def pixel_solid_angles(size: tuple[int, int], field: tuple[float, float]) -> Array:
+    """Solid angles (h, w), sr, of the pixels of a perspective picture: area cos^3 / f^2."""
+    area = 4.0 * math.prod(plane(field)) / math.prod(size)
+    return np.asarray(area * np.abs(directions(size, field)[..., 2]) ** 3)
 
 
 def painted(
@@ -138,8 +140,7 @@ def seen(
     size = width, height
     rays = directions(size, field).reshape(-1, 3)
     theta = np.degrees(np.arccos(np.clip(rays @ rays.T, -1.0, 1.0)))
-    area = 4.0 * math.prod(plane(field)) / math.prod(size)
-    solid = area * np.abs(rays[:, 2]) ** 3
+    solid = pixel_solid_angles(size, field).ravel()
     weights = kernel(model, observer, pixel_angle(size, field), theta) * solid
     flat = picture.reshape(-1, channels)
     out = (1.0 - weights.sum(axis=1))[:, None] * flat + weights @ flat

@@ -15,6 +15,9 @@ import numpy.typing as npt
 
 Ints = npt.NDArray[np.int32]
 
+#: Sizes that not one rectangle in so many wants are no program of their own.
+_RARE = 16
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lists:
@@ -29,6 +32,11 @@ class Lists:
         """All of ``order`` for every rectangle."""
         count = np.full(rectangles, len(order), np.int32)
         return Lists(order, np.zeros_like(count), count)
+
+    @property
+    def alike(self) -> bool:
+        """Whether all rectangles have as many."""
+        return bool(np.all(self.count == self.count[:1]))
 
     def after(self, begin: int) -> Lists:
         """The same where ``order`` is joined to another of ``begin`` entries."""
@@ -50,9 +58,10 @@ def batches(
     rows: int,
     coned: Lists,
     coned_sizes: tuple[int, ...],
+    coned_rows: int,
     varyings: int,
 ) -> list[Draws]:
-    """Cut the lists of the rectangles into batches; ``rows``: texels of a light of the first kind.
+    """Cut the lists of the rectangles into batches; ``rows``: texels of a light of either kind.
 
     ``sizes``, ascending: how many lights a batch may hold; both kinds together no more than
     ``varyings`` texels. Either kind may be empty.
@@ -73,7 +82,7 @@ def batches(
         size = np.concatenate([[0], own])[np.searchsorted(own, rest, "left") + (rest > 0)]
         rests.append((kind.first + full * own[-1], rest, size))
     (first, count, size), (cone_first, cone_count, cone_size) = rests
-    together = size * rows + cone_size * 3 <= varyings
+    together = size * rows + cone_size * coned_rows <= varyings
     table = np.stack([first, count, cone_first, cone_count], axis=1).astype(np.int32)
     for chosen, one, two in (
         (together, size, cone_size),
@@ -81,8 +90,27 @@ def batches(
         (~together, np.zeros_like(size), cone_size),
     ):
         pairs = np.stack([one, two], axis=1)
-        wanted = chosen & (pairs.sum(axis=1) > 0)
-        for pair in np.unique(pairs[wanted], axis=0):
-            at = rectangles[wanted & (pairs == pair).all(axis=1)]
-            draws.append(Draws((int(pair[0]), int(pair[1])), at, table[at]))
+        at = rectangles[chosen & (pairs.sum(axis=1) > 0)]
+        found, pair = _common(pairs[at], len(rectangles) // _RARE)
+        for k in np.unique(pair):
+            one_pair = at[pair == k]
+            draws.append(Draws((int(found[k, 0]), int(found[k, 1])), one_pair, table[one_pair]))
     return draws
+
+
+def _common(pairs: Ints, least: int) -> tuple[Ints, npt.NDArray[np.intp]]:
+    """Pairs of sizes (m, 2) as numbers of the distinct ones (k, 2).
+
+    Those of fewer than ``least`` rectangles take the next larger one that there is.
+    """
+    found, which, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    which = which.reshape(-1)
+    for number in np.argsort(count, kind="stable"):
+        larger = np.flatnonzero(np.all(found >= found[number], axis=1) & (count > 0))
+        larger = larger[larger != number]
+        if count[number] < least and len(larger):
+            next_larger = larger[np.argmin(found[larger].sum(axis=1))]
+            count[next_larger] += count[number]
+            count[number] = 0
+            which[which == number] = next_larger
+    return found, which

@@ -23,6 +23,7 @@ from hdrusd.errors import SourceRef
 from hdrusd.gpu.buffers import weld
 from hdrusd.gpu.lamp_glass import LampGlass, box_of, placed_boxes
 from hdrusd.gpu.program import Programs
+from hdrusd.gpu.release import release
 from hdrusd.gpu.textures import TextureCache
 from hdrusd.report import Kind, Report
 from hdrusd.scene import Draw, Geometry, Material, RenderScene, TextureUse
@@ -106,10 +107,11 @@ class _Mesh:
 class Group:
     """Casters in one buffer, each with a box; ``transforms`` None: merged chunks.
 
-    ``links``: the shadow links that name it.
+    ``named`` (n + 1, s): whether shadow link n names a caster of the s-th kind; 0 names all.
     """
 
-    links: frozenset[int]
+    named: Booleans
+    kinds: npt.NDArray[np.intp]  # (b,) of each box
     cutout: Cutout | None
     vao: moderngl.VertexArray
     boxes: Doubles  # (b, 2, 3) middle and half size, m from the origin
@@ -163,7 +165,7 @@ class Casters:
         self.reach = _REACH  # m from the origin, along each axis
         self.still: list[Group] = []
         self.moving: list[Group] = []
-        self._links: tuple[int, ...] = ()
+        self._links = 0
         self._known: list[_Caster] | None = None
         self._meshes: dict[tuple[str, Cutout | None], _Mesh] = {}
         self._glass = LampGlass()
@@ -174,7 +176,7 @@ class Casters:
     def update(self, scene: RenderScene) -> bool:
         """Take a moment's casters; True where what stands still is not what it was."""
         self._frame += 1
-        links = tuple(int(n) for n in np.unique(scene.lights["shadow_link"]) if n > 0)
+        links = int(scene.lights["shadow_link"].max(initial=0))
         holes = [self._holes(material) for material in scene.materials]
         cast = [
             _Caster(draw, hole)
@@ -200,6 +202,12 @@ class Casters:
             self._meshes.pop(key).release()
         self._say_far()
         return changed
+
+    def release(self) -> None:
+        """Give the GPU's memory back."""
+        release(self.still, self._meshes)
+        self.still, self.moving, self._known = [], [], None
+        self._meshes.clear()
 
     def bounds(self, *, moving: bool = True) -> Doubles:
         """(2, 3) lowest and highest corner of all casters within ``reach``; zeros for none.
@@ -240,28 +248,31 @@ class Casters:
             return None if use.fallback[channel] * scale + bias >= threshold else _Nothing()
         return Cutout(use, uploaded.texture, channel, scale, bias, threshold)
 
-    def _linked(self, draw: Draw) -> frozenset[int]:
-        return frozenset(n for n in self._links if draw.shadow_links >> (n - 1) & 1)
+    def _named(self, kinds: Sequence[int]) -> Booleans:
+        """``Group.named`` of kinds of ``Draw.shadow_links``."""
+        size = (self._links + 7) // 8
+        whole = b"".join((k & ((1 << 8 * size) - 1)).to_bytes(size, "little") for k in kinds)
+        bits = np.frombuffer(whole, np.uint8).reshape(len(kinds), size).T
+        table = np.unpackbits(bits, axis=0, count=self._links, bitorder="little")
+        return np.concatenate([np.ones((1, len(kinds)), np.bool_), table.astype(np.bool_)])
 
     def _still(self, casters: Sequence[_Caster]) -> list[Group]:
-        """Merged geometry by what shadow links and holes it has; and what is drawn often."""
+        """Merged geometry by what holes it has; and what is drawn often."""
         groups: list[Group] = []
-        merged: dict[tuple[frozenset[int], Cutout | None], list[_Caster]] = {}
+        merged: dict[Cutout | None, list[_Caster]] = {}
         for caster in casters:
             draw = caster.draw
             copies = len(draw.transforms)
             if copies > 1 and copies * len(draw.geometry.points) > _MERGED:
                 groups.append(self._placed(caster))
             else:
-                key = self._linked(draw), caster.cutout
-                merged.setdefault(key, []).append(caster)
-        found = [self._merged(*key, members) for key, members in merged.items()]
+                merged.setdefault(caster.cutout, []).append(caster)
+        found = [self._merged(cutout, members) for cutout, members in merged.items()]
         return groups + [group for group in found if group is not None]
 
-    def _merged(
-        self, links: frozenset[int], cutout: Cutout | None, members: Sequence[_Caster]
-    ) -> Group | None:
+    def _merged(self, cutout: Cutout | None, members: Sequence[_Caster]) -> Group | None:
         corners = []
+        names: dict[int, int] = {}  # number of each kind
         for member in members:
             draw = member.draw
             points = draw.geometry.points.astype(np.float64)
@@ -272,22 +283,30 @@ class Casters:
                 uv = np.tile(self._uvs(draw.geometry, cutout), (len(moved), 1))
                 flat = np.concatenate([flat, uv], axis=1)
             corners.append(_sound(flat))
+        kinds = [names.setdefault(m.draw.shadow_links, len(names)) for m in members]
+        kind = np.repeat(kinds, [len(flat) // 3 for flat in corners])
         triangles = np.concatenate(corners).reshape(-1, 3, 3 if cutout is None else 5)
         places = triangles[..., :3]
         inside = (places.min(axis=1) <= self.reach) & (places.max(axis=1) >= -self.reach)
         within = np.all(inside, axis=1)
         self._far += int(np.sum(~within))
-        triangles = triangles[within]
+        triangles, kind = triangles[within], kind[within]
         if len(triangles) == 0:
             return None
-        triangles = triangles[_neighbours(triangles[..., :3])]
-        starts = np.arange(0, len(triangles), CHUNK)
+        order = _neighbours(triangles[..., :3])
+        order = order[np.argsort(kind[order], kind="stable")]
+        triangles, kind = triangles[order], kind[order]
+        # A chunk is of one kind.
+        first = np.flatnonzero(np.diff(kind, prepend=-1))
+        ends = np.append(first[1:], len(kind))
+        starts = np.concatenate([np.arange(a, b, CHUNK) for a, b in zip(first, ends, strict=True)])
         low = np.minimum.reduceat(triangles[..., :3].min(axis=1), starts).astype(np.float64)
         high = np.maximum.reduceat(triangles[..., :3].max(axis=1), starts).astype(np.float64)
         vertices, indices = weld(np.ascontiguousarray(triangles.reshape(-1, triangles.shape[2])))
         vao, buffers = self._buffers(vertices, indices, cutout is not None)
         return Group(
-            links=links,
+            named=self._named(list(names)),
+            kinds=kind[starts],
             cutout=cutout,
             vao=vao,
             boxes=np.stack([(low + high) / 2.0, (high - low) / 2.0], axis=1),
@@ -308,7 +327,8 @@ class Casters:
         self._far += int(np.sum(~within))
         places, boxes = places[within], boxes[within]
         return Group(
-            links=self._linked(draw),
+            named=self._named([draw.shadow_links]),
+            kinds=np.zeros(len(boxes), np.intp),
             cutout=cutout,
             vao=mesh.vao,
             boxes=boxes,
@@ -362,23 +382,6 @@ class Casters:
         )
         names = ("3f 2f", "in_position", "in_uv") if textured else ("3f", "in_position")
         return self.ctx.vertex_array(program, [(buffers[0], *names)], buffers[1]), buffers
-
-
-def frustum_sees(matrices: Doubles, boxes: Doubles) -> Booleans:
-    """(t, b): whether box b (middle, half size) may reach into the clip space of tile t.
-
-    ``matrices`` (t, 4, 4) row-vector; a box that straddles two planes outside may pass.
-    """
-    x, y, z, w = matrices.transpose(2, 0, 1)  # columns: each (t, 4), coefficients of a plane
-    planes = np.stack([w + x, w - x, w + y, w - y, w + z], axis=1).reshape(-1, 4)
-    # A block of planes at a time: what it takes does not grow with the scene.
-    rows = max(5, 4_000_000 // max(len(boxes), 1) // 5 * 5)
-    seen = []
-    for first in range(0, len(planes), rows):
-        some = planes[first : first + rows]
-        reach = boxes[:, 0] @ some[:, :3].T + boxes[:, 1] @ np.abs(some[:, :3]).T + some[:, 3]
-        seen.append(np.all(reach.reshape(len(boxes), -1, 5) > 0.0, axis=2).T)
-    return np.concatenate(seen) if seen else np.zeros((0, len(boxes)), np.bool_)
 
 
 def _same(known: Sequence[_Caster], casters: Sequence[_Caster]) -> bool:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from hdrusd.eye.observer import Observer
 from hdrusd.glare.model import GlareModel
-from hdrusd.glare.pyramid import MARGIN, Pyramid, as_lamps, pyramid
+from hdrusd.glare.pyramid import MARGIN, NODES, Pyramid, as_lamps, pyramid
 from hdrusd.gpu.blending import blending
 from hdrusd.gpu.program import Programs, set_uniforms
 
@@ -65,7 +65,7 @@ class GlarePass:
         self._halve(hdr, plan)
         veil = self._spread(plan, rows)
         for level in range(plan.last, plan.first - 1, -1):
-            if not plan.weights:
+            if not plan.weights.size:
                 break
             if rows is not None:
                 self._splat(plan, level, rows)
@@ -133,9 +133,13 @@ class GlarePass:
     def _add(self, plan: Pyramid, level: int, veil: moderngl.Texture) -> moderngl.Texture:
         source = self._texture(plan, "level", level)
         coarser = level < plan.last
+        corner, sides = plan.plane_steps(level)
         uniforms: dict[str, Any] = {
             "texel": _texel(source),
-            "weights": plan.weights[level - plan.first],
+            "weights": plan.weights[:, level - plan.first],
+            "plane_corner": corner,
+            "plane_texel": sides,
+            "inverse_step": (NODES - 1) / max(1.0 - plan.least, 1e-9),
         }
         if coarser:
             uniforms["veil_texel"] = _texel(veil)
@@ -173,7 +177,7 @@ class GlarePass:
         textures: dict[str, tuple[moderngl.Texture, moderngl.Sampler]],
         uniforms: dict[str, Any],
     ) -> None:
-        vertices = self.programs.fullscreen(fragment, {"MARGIN": MARGIN, **defines})
+        vertices = self.programs.fullscreen(fragment, {"MARGIN": MARGIN, "NODES": NODES, **defines})
         units = {name: unit for unit, name in enumerate(textures)}
         set_uniforms(vertices.program, {**units, **uniforms})
         for unit, (texture, sampler) in enumerate(textures.values()):
@@ -196,7 +200,8 @@ class GlarePass:
         return self._frames[key]
 
     def _texture(self, plan: Pyramid, kind: str, level: int) -> moderngl.Texture:
-        texture: moderngl.Texture = self._frame(plan, kind, level).color_attachments[0]
+        (texture,) = self._frame(plan, kind, level).color_attachments
+        assert isinstance(texture, moderngl.Texture)
         return texture
 
     def _forget(self) -> None:

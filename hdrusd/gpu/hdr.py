@@ -35,6 +35,7 @@ from hdrusd.gpu.lights import PROFILE_UNIT, SAMPLES, SHADOW_UNIT, LightMode, Lig
 from hdrusd.gpu.peeling import MAX_LAYERS, Peeling
 from hdrusd.gpu.profiles import PROFILE, ProfileAtlas
 from hdrusd.gpu.program import Programs
+from hdrusd.gpu.release import release
 from hdrusd.gpu.shadows import ShadowMaps
 from hdrusd.gpu.sky import SkyPass
 from hdrusd.gpu.sky_occlusion import SkyOcclusion
@@ -91,7 +92,7 @@ class HdrRenderer:
         self.report = Report() if report is None else report
         self.place = place or SourceRef(Path())
         self.scale = REFLECTION_SCALE[options.reflection]
-        textures = TextureCache(ctx, load, options.gamma)
+        self._textures = textures = TextureCache(ctx, load, options.gamma)
         self.surfaces = SurfacePass(ctx, programs, textures, self.scale)
         self.lights = LightPass(ctx, programs, size, self.scale, options.lights)
         self.skies = SkyPass(ctx, programs, load, options.gamma, self.report)
@@ -120,7 +121,7 @@ class HdrRenderer:
                 self.report,
                 self.place,
             )
-            self._scattered = self._texture()
+        self._scattered = self._texture() if options.sky_samples else None
         self._layers = {name: self._texture() for name in LAYERS[:-1]}
         self._depth = ctx.depth_texture(size)
         self._gbuffer = self._attached()
@@ -151,6 +152,15 @@ class HdrRenderer:
             self._sum.add(self._layers["hdr"], 1.0 / len(self._samples))
         self._tell_merged()
         return self.hdr
+
+    def release(self) -> None:
+        """Give the GPU's memory back, but for the programs; it draws no more."""
+        # What is bound must not be released.
+        self.ctx.extra["framebuffer"].use()
+        release(self._occlusion, self._casters, self._shadows, self._profiles, self._peeling)
+        release(self.surfaces, self.lights, self.skies, self._sum, self._textures)
+        release(self._gbuffer, self._frame, self._distances)
+        release(self._layers, self._scattered, self._depth)
 
     @property
     def light_error(self) -> float:
@@ -187,6 +197,7 @@ class HdrRenderer:
             layers.pop("g_extra", None)
         arriving = None
         if self._occlusion is not None:
+            assert self._scattered is not None
             self._occlusion.add(scene, layers | {"g_scattered": self._scattered}, self._frame)
             arriving = self._occlusion.arriving
         self.skies.add_mirrored(scene, layers, self._frame, self.scale, arriving)
@@ -264,7 +275,7 @@ class HdrRenderer:
 
     def _attached(self) -> moderngl.Framebuffer:
         """The G-buffer, with what is scattered of the sky where that comes later."""
-        apart = [self._scattered] if self._occlusion is not None else []
+        apart = [self._scattered] if self._scattered is not None else []
         return self.ctx.framebuffer([*self._layers.values(), *apart], self._depth)
 
     def _extras(self, scene: RenderScene) -> Extras:

@@ -44,13 +44,22 @@ class ToneMapper:
         self._upload: moderngl.Texture | None = None
 
     def apply(
-        self, hdr: moderngl.Texture, operator: Operator, moment: Moment, *, top_first: bool = False
+        self,
+        hdr: moderngl.Texture,
+        operator: Operator,
+        moment: Moment,
+        *,
+        night: tuple[float, float] | None = None,
+        rods: bool = False,
+        top_first: bool = False,
     ) -> npt.NDArray[np.uint8] | npt.NDArray[np.uint16]:
         """The picture of an RGB(A) float texture in cd/m2: (h, w, 3) code values, top row first.
 
         Of ``moment.screen``: 16 bits for PQ, else 8. The texture's row 0 is the bottom one, as
         OpenGL draws it, unless ``top_first``. NaN and negative channels are black. ``moment``
         has the operator's complete parameters, and the statistics and state that it needs.
+        ``night``: shares of eye.scotopic.night_colour; with ``rods`` alpha corrects the scotopic
+        luminance of RGB.
         Raises HdrusdError for these, ShaderError.
         """
         width, height = hdr.size
@@ -63,6 +72,8 @@ class ToneMapper:
             "OPERATOR_GLSL": f'"{operator.glsl}"',
             "ENCODE": f"encode_{eotf}",
         }
+        if night is not None:
+            defines["NIGHT"] = int(rods)
         around: list[moderngl.Texture] = []
         if operator.blurs is not None:
             kernels = operator.blurs(moment.parameters)
@@ -76,6 +87,8 @@ class ToneMapper:
             "row_step": 1 if top_first else -1,
             **{f"around_{i}": 1 + i for i in range(len(around))},
         }
+        if night is not None:
+            shared["night_ramp"], shared["night_tint"] = night
         if eotf in _ABSOLUTE:
             shared["panel"] = screen.black, screen.peak
         set_uniforms(vertices.program, shared)
@@ -103,14 +116,16 @@ class ToneMapper:
         return self.apply(self.upload(rgb), operator, moment, top_first=True)
 
     def upload(self, rgb: npt.NDArray[np.float32]) -> moderngl.Texture:
-        """A frame (h, w, 3) as a texture whose row 0 is the frame's, valid until the next one."""
-        height, width = rgb.shape[:2]
-        if self._upload is None or self._upload.size != (width, height):
-            if self._upload is not None:
-                self._upload.release()
-            self._upload = self.ctx.texture((width, height), 3, dtype="f4", alignment=1)
-        self._upload.write(np.ascontiguousarray(rgb, np.float32), alignment=1)
-        return self._upload
+        """A frame (h, w, 3 or 4) as a texture whose row 0 is the frame's, valid until the next."""
+        height, width, channels = rgb.shape
+        kept = self._upload
+        if kept is None or (*kept.size, kept.components) != (width, height, channels):
+            if kept is not None:
+                kept.release()
+            kept = self.ctx.texture((width, height), channels, dtype="f4", alignment=1)
+            self._upload = kept
+        kept.write(np.ascontiguousarray(rgb, np.float32), alignment=1)
+        return kept
 
     def release(self) -> None:
         """Free all that was kept."""

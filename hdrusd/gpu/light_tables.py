@@ -2,13 +2,15 @@
 
 What a light needs in a pixel decides its class, for a software device runs every term
 that a shader has. Most lamps are points, perhaps with a beam, and travel light: two to
-four texels. All others (area lights, profiles, shadows, links, factors) have six texels
-and those of their extras.
+four texels. Where they are of one make (colour, radius, cone), as along a street, that
+travels once for all of them, which leaves one texel a lamp, two with a beam. All others
+(area lights, profiles, shadows, links, factors) have six texels and those of their extras.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -22,8 +24,18 @@ Floats = npt.NDArray[np.float32]
 Lights = npt.NDArray[np.void]
 
 #: Batches smaller than the full one, so that a rest of lights costs no more than it must.
-#: Few, for each is a program to compile.
-_SMALL_BATCHES = (1, 4)
+#: Few, for each is a program to compile; more where every rectangle has the same rest.
+_SMALL_BATCHES = (1, 4, 8, 15, 22)
+_SMALL_ALIKE = (1, 2, 3, 4, 6, 8, 10, 12, 16, 20, 24)
+
+#: A make of lamps is a class of its own where that leaves none over, or saves as many a batch.
+_ONE_MAKE = 30
+
+#: The class of one make for each class that may have one.
+_MAKES = {"PLAIN": "LAMPS", "CONES": "BEAMS"}
+
+#: Colours that are the same to so many decimals of their largest channel are one.
+_COLOUR_DECIMALS = 7
 
 _SHAPES = {SPHERE: "SPHERE", DISK: "DISK", RECT: "RECT", CYLINDER: "CYLINDER"}
 
@@ -63,16 +75,21 @@ class LightClass:
     defines: tuple[str, ...]
     members: npt.NDArray[np.intp]  # (n,) their numbers in the scene
     texels: Floats  # (n + 1, rows, 4); the last is dark and fills batches
+    uniforms: Mapping[str, tuple[float, ...]] = field(default_factory=dict)  # of one make
 
     @property
     def rows(self) -> int:
         """Texels a light."""
         return int(self.texels.shape[1])
 
-    def batches(self, varyings: int) -> tuple[int, ...]:
-        """How many of them a batch may hold, ascending; ``varyings``: vec4 for their texels."""
+    def batches(self, varyings: int, alike: bool) -> tuple[int, ...]:
+        """How many of them a batch may hold, ascending.
+
+        ``varyings``: vec4 for their texels; ``alike``: all rectangles have as many of them.
+        """
         full = varyings // self.rows
-        return (*(size for size in _SMALL_BATCHES if 2 * size <= full), full)
+        small = _SMALL_ALIKE if alike else _SMALL_BATCHES
+        return (*(size for size in small if 4 * size <= 3 * full or (alike and size < full)), full)
 
 
 def light_classes(lights: Lights, camera: Camera, extras: Extras | None = None) -> list[LightClass]:
@@ -82,7 +99,7 @@ def light_classes(lights: Lights, camera: Camera, extras: Extras | None = None) 
     """
     lit = np.flatnonzero(np.any(lights["intensity"] != 0.0, axis=1))
     chosen = lights[lit]
-    kinds = _kinds(chosen, None if extras is None else extras.of(lit))
+    kinds = _with_makes(chosen, _kinds(chosen, None if extras is None else extras.of(lit)))
     names, which = np.unique(kinds, return_inverse=True)
     classes = []
     for number, name in enumerate(names):
@@ -97,8 +114,49 @@ def light_classes(lights: Lights, camera: Camera, extras: Extras | None = None) 
             if PROFILE in defines:
                 parts.append(_with_dark(own.profile))
             texels = np.concatenate(parts, axis=1)
-        classes.append(LightClass(defines, members, np.ascontiguousarray(texels, np.float32)))
+        table = np.ascontiguousarray(texels, np.float32)
+        classes.append(LightClass(defines, members, table, _make(lights[members], str(name))))
     return classes
+
+
+def _with_makes(lights: Lights, kinds: npt.NDArray[np.str_]) -> npt.NDArray[np.str_]:
+    """The kinds, where the commonest make of lamps has one of its own."""
+    for kind, make in _MAKES.items():
+        number = np.all(np.isfinite(lights["intensity"]), axis=1)
+        own = np.flatnonzero((kinds == kind) & (lights["w"] == 1.0) & number)
+        if not len(own):
+            continue
+        lamps = lights[own]
+        colour = lamps["intensity"] / np.max(np.abs(lamps["intensity"]), axis=1, keepdims=True)
+        same = [np.round(colour, _COLOUR_DECIMALS), lamps["radius"][:, None]]
+        if make == "BEAMS":
+            same += [lamps["inner"][:, None], lamps["outer"][:, None]]
+        keys = np.ascontiguousarray(np.concatenate(same, axis=1) + 0.0)
+        words = keys.view(np.dtype((np.void, keys.dtype.itemsize * keys.shape[1]))).ravel()
+        _, which, count = np.unique(words, return_inverse=True, return_counts=True)
+        most = int(np.argmax(count))
+        if count[most] == np.count_nonzero(kinds == kind) or count[most] >= _ONE_MAKE:
+            kinds = kinds.copy()
+            kinds[own[which == most]] = make
+    return kinds
+
+
+def _make(lamps: Lights, kind: str) -> dict[str, tuple[float, ...]]:
+    """The uniforms that say what lamps of one make have in common."""
+    if kind not in _MAKES.values():
+        return {}
+    first = lamps[:1]
+    make = *(first["intensity"] / _strength(first))[0], *inverse_square(first["radius"])
+    if kind == "LAMPS":
+        return {"lamp_make": tuple(map(float, make))}
+    edge = *first["inner"], *inverse_edge(first["inner"], first["outer"])
+    return {"beam_make": tuple(map(float, make)), "beam_edge": tuple(map(float, edge))}
+
+
+def _strength(lamps: Lights) -> npt.NDArray[np.float64]:
+    """(n,) the channel of the intensity that is farthest from 0, cd, with its sign."""
+    largest = np.argmax(np.abs(lamps["intensity"]), axis=1)
+    return np.asarray(lamps["intensity"][np.arange(len(lamps)), largest], np.float64)
 
 
 def _with_dark(texels: Floats) -> Floats:
@@ -139,6 +197,8 @@ def _texels(lights: Lights, camera: Camera, kind: str) -> npt.NDArray[np.float64
         return _cones(lights, camera)
     if kind == "FOCUS":
         return _focus(lights, camera)
+    if kind in _MAKES.values():
+        return _of_one_make(lights, camera, kind)
     texels = np.zeros((len(lights) + 1, 6, 4))
     texels[:, :2] = _plain(lights, camera)
     texels[-1, 2:] = [[0, 0, 1, 1], [1, 0, 0, 0], [0, 1, 0, 1], [1, 1, 0, 0]]
@@ -168,6 +228,15 @@ def _cones(lights: Lights, camera: Camera) -> npt.NDArray[np.float64]:
     texels[:-1, 1, :3], texels[:-1, 1, 3] = lights["intensity"], lights["inner"]
     texels[:-1, 2, :3] = lights["axis"]
     texels[:-1, 2, 3] = inverse_edge(lights["inner"], lights["outer"])
+    return texels
+
+
+def _of_one_make(lights: Lights, camera: Camera, kind: str) -> npt.NDArray[np.float64]:
+    texels = np.zeros((len(lights) + 1, 1 if kind == "LAMPS" else 2, 4))
+    texels[-1, 0], texels[-1, 1:] = [0.0, 0.0, 1e6, 0.0], [0.0, 0.0, 1.0, 0.0]
+    texels[:-1, 0, :3], texels[:-1, 0, 3] = _relative(lights, camera), _strength(lights)
+    if kind == "BEAMS":
+        texels[:-1, 1, :3] = lights["axis"]
     return texels
 
 

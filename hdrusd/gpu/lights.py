@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from typing import Any, Literal
 
 import moderngl
@@ -20,6 +21,7 @@ import numpy.typing as npt
 from hdrusd.gpu.batches import Draws, Lists, batches
 from hdrusd.gpu.light_tables import Extras, LightClass, light_classes
 from hdrusd.gpu.program import Programs
+from hdrusd.gpu.release import release
 from hdrusd.gpu.surfaces import set_used
 from hdrusd.gpu.tiles import LightLists, TileList, tile_balls
 from hdrusd.photometry.lighttree import has_beam
@@ -50,7 +52,8 @@ SAMPLES = 16
 #: Bits of a tile's highlights, and the #defines for them.
 _GLOSS: dict[int, tuple[str, ...]] = {0: (), 1: ("BLINN",), 2: ("GGX",), 3: ("BLINN", "GGX")}
 
-_PLAIN, _CONES = ("PLAIN",), ("CONES",)
+#: Lamps without and with a cone that may share a batch, those of one make first.
+_LAMPS, _BEAMS = (("LAMPS",), ("PLAIN",)), (("BEAMS",), ("CONES",))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,6 +147,10 @@ class LightPass:
             frame.depth_mask = True
             ctx.enable_only(moderngl.NOTHING)
 
+    def release(self) -> None:
+        """Give the GPU's memory back."""
+        release(self._vaos, self._areas, self._list_buffer, self._bounds_frame, self._bounds)
+
     @property
     def merged(self) -> int:
         """How many lamps of the last frame may have been seen as one with others."""
@@ -222,17 +229,18 @@ class LightPass:
                 continue
             texture = _texture(self.ctx, order, "i4")
             texture.use(ORDER_UNIT)
-            rows = kind.rows if kind is not None else 2
             own = {**uniforms, "dark": (table.dark(first), table.dark(second))}
+            own |= (dict(kind.uniforms) if kind else {}) | (dict(coned.uniforms) if coned else {})
             for draws in batches(
                 lists,
-                kind.batches(self._varyings) if kind is not None else (1,),
-                rows,
+                kind.batches(self._varyings, lists.alike) if kind is not None else (1,),
+                kind.rows if kind is not None else 1,
                 coned_lists.after(len(lists.order)),
-                coned.batches(self._varyings) if coned is not None else (1,),
+                coned.batches(self._varyings, coned_lists.alike) if coned is not None else (1,),
+                coned.rows if coned is not None else 1,
                 self._varyings,
             ):
-                program = self._program(kind, rows, draws.sizes, names)
+                program = self._program(kind, coned, draws.sizes, names)
                 for name, value in own.items():
                     set_used(program, name, value)
                 if bind is not None and kind is not None:
@@ -241,17 +249,20 @@ class LightPass:
             texture.release()
 
     def _program(
-        self, kind: LightClass | None, rows: int, sizes: tuple[int, int], names: Sequence[str]
+        self,
+        kind: LightClass | None,
+        coned: LightClass | None,
+        sizes: tuple[int, int],
+        names: Sequence[str],
     ) -> moderngl.Program:
-        first, coned = sizes
-        defines: dict[str, str | int | float] = {
-            "ROWS": rows,
-            "FIRST": first,
-            "CONED": coned,
-            "ALL_FIRST": f"ALL{first}",
-            "ALL_CONED": f"ALL{coned}",
-        }
-        own = kind.defines if kind is not None and first else ()
+        used = [c if size else None for c, size in zip((kind, coned), sizes, strict=True)]
+        defines: dict[str, str | int | float] = {}
+        for which, each, size in zip(("FIRST", "CONED"), used, sizes, strict=True):
+            defines[which] = size
+            defines[f"{which}_ROWS"] = each.rows if each is not None else 0
+            # Applies the macro X to each of them.
+            defines[f"ALL_{which}(X)"] = " ".join(f"X({k})" for k in range(size))
+        own = [name for each in used if each is not None for name in each.defines]
         if "SHADOWED" in own:
             defines["SAMPLES"] = SAMPLES
         defines |= dict.fromkeys((*own, *names), 1)
@@ -330,9 +341,10 @@ class _Table:
     def pairs(self) -> list[tuple[int | None, int | None]]:
         """What is drawn together: lamps without and with a cone, each other class alone."""
         named = {kind.defines: number for number, kind in enumerate(self.classes)}
-        simple = named.pop(_PLAIN, None), named.pop(_CONES, None)
+        plain = [named.pop(name) for name in _LAMPS if name in named]
+        coned = [named.pop(name) for name in _BEAMS if name in named]
         rest: list[tuple[int | None, int | None]] = [(number, None) for number in named.values()]
-        return rest if simple == (None, None) else [simple, *rest]
+        return [*zip_longest(plain, coned), *rest]
 
 
 def shines(material: Material) -> bool:

@@ -20,7 +20,8 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.eye.foveal import Foveal, default_field, foveal
+from hdrusd.eye.foveal import default_field
+from hdrusd.gpu.foveal import FovealSampler
 from hdrusd.gpu.program import Programs, set_uniforms
 from hdrusd.tonemap.operator import FLOOR, Need, Statistics, percentile_rank
 
@@ -42,6 +43,7 @@ class Measurer:
             border_color=(0.0, 0.0, 0.0, 0.0),
         )
         self._targets: dict[str, moderngl.Framebuffer] = {}
+        self._fovea = FovealSampler(ctx, programs)
 
     def measure(
         self,
@@ -63,7 +65,17 @@ class Measurer:
         if Need.FOVEAL not in need:
             return stats
         field = field or default_field(*hdr.size)
-        return replace(stats, foveal=_read_foveal(hdr, field, top_first))
+        return replace(stats, foveal=self._fovea.sample(hdr, field, top_first=top_first))
+
+    def release(self) -> None:
+        """Free the targets."""
+        for target in self._targets.values():
+            for layer in target.color_attachments:
+                layer.release()
+            target.release()
+        self._targets.clear()
+        self._fovea.release()
+        self._sampler.release()
 
     def _luminances(self, hdr: moderngl.Texture, percentiles: bool) -> Statistics:
         width, height = hdr.size
@@ -132,9 +144,3 @@ def _read(
 ) -> npt.NDArray[Any]:
     data = target.read(components=components, attachment=attachment, dtype=dtype, alignment=1)
     return np.frombuffer(data, dtype)
-
-
-def _read_foveal(hdr: moderngl.Texture, field: tuple[float, float], top_first: bool) -> Foveal:
-    pixels = np.frombuffer(hdr.read(alignment=1), np.float32)
-    frame = pixels.reshape(hdr.height, hdr.width, -1)[..., :3]
-    return foveal(frame if top_first else frame[::-1], field)

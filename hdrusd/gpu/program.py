@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.errors import ShaderError
+from hdrusd.gpu.release import release
 from hdrusd.gpu.source import Defines, Source, load
 
 #: What a uniform takes: a number, a vector, or an array of numbers.
@@ -39,6 +40,12 @@ class Programs:
         if program not in self._passes:
             self._passes[program] = self.ctx.vertex_array(program, [])
         return self._passes[program]
+
+    def release(self) -> None:
+        """Give all of them back; those that are asked for later are built anew."""
+        release(self._passes, self._programs)
+        self._passes.clear()
+        self._programs.clear()
 
 
 def build(

@@ -14,8 +14,10 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.gpu.casters import TABLE, Group, Run, frustum_sees
+from hdrusd.gpu.casters import TABLE, Group, Run
 from hdrusd.gpu.program import Programs
+from hdrusd.gpu.release import release
+from hdrusd.gpu.shadow_views import frustum_sees
 from hdrusd.gpu.surfaces import set_used
 
 Doubles = npt.NDArray[np.float64]
@@ -75,10 +77,8 @@ def join(parts: Sequence[Tiles]) -> Tiles:
 
 def seen_by(tiles: Tiles, group: Group) -> Booleans:
     """(t, b): whether a tile sees a box of the group, and its light's link lets it cast."""
-    allowed = np.array([link == 0 or link in group.links for link in tiles.links.tolist()])
-    seen = np.zeros((len(tiles), len(group.boxes)), np.bool_)
-    if allowed.any() and len(group.boxes):
-        seen[allowed] = frustum_sees(tiles.matrices[allowed], group.boxes)
+    allowed = group.named[tiles.links][:, group.kinds]
+    seen: Booleans = allowed & frustum_sees(tiles.matrices, group.boxes)
     return seen
 
 
@@ -113,6 +113,12 @@ class TileDrawing:
                 self._blank.framebuffer.clear(depth=1.0)
             target = self._blank
         target.texture.use(unit)
+
+    def release(self) -> None:
+        """Give the GPU's memory back."""
+        release(self._shown, self._kept, self._blank, self._squares)
+        self.size, self._shown, self._kept, self._blank = (0, 0), None, None, None
+        self._squares.clear()
 
     def resize(self, size: tuple[int, int]) -> bool:
         """Make room; True where what was drawn is lost."""

@@ -263,3 +263,20 @@ def _frame(axis: Doubles, x: Doubles) -> Doubles:
         u = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     u = u / np.linalg.norm(u)
     return np.array([u, np.cross(axis, u), axis])
+
+
+def frustum_sees(matrices: Doubles, boxes: Doubles) -> Booleans:
+    """(t, b): whether box b (middle, half size) may reach into the clip space of tile t.
+
+    ``matrices`` (t, 4, 4) row-vector; a box that straddles two planes outside may pass.
+    """
+    x, y, z, w = matrices.transpose(2, 0, 1)  # columns: each (t, 4), coefficients of a plane
+    planes = np.stack([w + x, w - x, w + y, w - y, w + z], axis=1).reshape(-1, 4)
+    # A block of planes at a time: what it takes does not grow with the scene.
+    rows = max(5, 4_000_000 // max(len(boxes), 1) // 5 * 5)
+    seen = []
+    for first in range(0, len(planes), rows):
+        some = planes[first : first + rows]
+        reach = boxes[:, 0] @ some[:, :3].T + boxes[:, 1] @ np.abs(some[:, :3]).T + some[:, 3]
+        seen.append(np.all(reach.reshape(len(boxes), len(some) // 5, 5) > 0.0, axis=2).T)
+    return np.concatenate(seen) if seen else np.zeros((0, len(boxes)), np.bool_)

@@ -25,6 +25,7 @@ from hdrusd.errors import SourceRef
 from hdrusd.gpu.cascades import DistantView, distant_view
 from hdrusd.gpu.casters import Casters, Group
 from hdrusd.gpu.program import Programs
+from hdrusd.gpu.release import release
 from hdrusd.gpu.shadow_atlas import Atlas, Block, smallest_atlas, tile_sizes
 from hdrusd.gpu.shadow_drawing import TileDrawing, Tiles, join, seen_by
 from hdrusd.gpu.shadow_views import View, local_view, pattern
@@ -147,6 +148,10 @@ class ShadowMaps:
     def use(self, unit: int) -> None:
         """Bind the atlas for ``sampler2DShadow shadow_atlas``."""
         self._drawing.use(unit)
+
+    def release(self) -> None:
+        """Give the GPU's memory back."""
+        release(self.casters, self._drawing)
 
     def update(self, scene: RenderScene) -> Shadows:
         """Draw what has changed for this moment's lights, casters and camera.

@@ -25,6 +25,7 @@ from hdrusd.errors import SourceRef
 from hdrusd.gpu.blending import blending
 from hdrusd.gpu.lights import window_uniforms
 from hdrusd.gpu.program import Programs
+from hdrusd.gpu.release import release
 from hdrusd.gpu.surfaces import set_used
 from hdrusd.gpu.textures import linear_texels
 from hdrusd.photometry.environment import LAST, WIDTHS, blurred_levels, reflected_table
@@ -86,6 +87,11 @@ class SkyPass:
         self._read: dict[TextureRef, _Read | None] = {}
         self._table: moderngl.Texture | None = None
         self._vaos: dict[moderngl.Program, moderngl.VertexArray] = {}
+
+    def release(self) -> None:
+        """Give the GPU's memory back."""
+        release(self._read, self._table, self._vaos)
+        self._read.clear()
 
     def with_suns(self, scene: RenderScene) -> RenderScene:
         """The scene with the suns of its skies as lights; first in every frame."""

@@ -29,6 +29,7 @@ from hdrusd.gpu.blending import blending
 from hdrusd.gpu.casters import Casters
 from hdrusd.gpu.lights import window_uniforms
 from hdrusd.gpu.program import Programs
+from hdrusd.gpu.release import release
 from hdrusd.gpu.shadow_drawing import TileDrawing, Tiles
 from hdrusd.gpu.sky import SkyPass
 from hdrusd.gpu.surfaces import set_used
@@ -86,6 +87,10 @@ class SkyOcclusion:
         self.arriving.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._sum = ctx.framebuffer([self.arriving])
         self._vaos: dict[moderngl.Program, moderngl.VertexArray] = {}
+
+    def release(self) -> None:
+        """Give the GPU's memory back, but for that of the casters."""
+        release(self._tiles, self._sum, self.arriving, self._vaos)
 
     def add(
         self,
@@ -151,7 +156,7 @@ class SkyOcclusion:
             self._tiles.draw(views.tiles(chosen, squares[:count]), groups)
             values = {
                 **views.uniforms(chosen, squares[:count], eye),
-                "luminance": np.append(luminance[chosen], views.scales(chosen), axis=1),
+                "shining": np.append(luminance[chosen], views.scales(chosen), axis=1),
             }
             # A batch that is not full is filled with darkness.
             full = {name: _filled(value) for name, value in values.items()}

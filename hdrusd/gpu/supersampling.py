@@ -15,6 +15,7 @@ import moderngl
 
 from hdrusd.gpu.blending import blending
 from hdrusd.gpu.program import Programs
+from hdrusd.gpu.release import release
 from hdrusd.scene import Camera
 
 
@@ -51,6 +52,10 @@ class Accumulator:
         self.texture = ctx.texture(size, 4, dtype="f4")
         self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._frame = ctx.framebuffer([self.texture])
+
+    def release(self) -> None:
+        """Give its memory back."""
+        release(self._frame, self.texture)
 
     def clear(self) -> None:
         """Begin anew."""

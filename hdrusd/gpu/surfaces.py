@@ -15,6 +15,7 @@ from hdrusd.gpu.buffers import mirrored, split
 from hdrusd.gpu.culling import in_view
 from hdrusd.gpu.materials import MaterialInputs, is_blended, material_inputs
 from hdrusd.gpu.program import Programs
+from hdrusd.gpu.release import release
 from hdrusd.gpu.source import Define
 from hdrusd.gpu.surface_batches import (
     MERGED_TRIANGLES,
@@ -127,6 +128,12 @@ class SurfacePass:
             self.ctx.disable(moderngl.CULL_FACE)
             self.ctx.front_face = "ccw"
 
+    def release(self) -> None:
+        """Give the GPU's memory back, but for that of the textures."""
+        release(self._batches, [moving.batches for moving in self._moving.values()])
+        self._batches, self._scene, self._still = [], None, ()
+        self._moving.clear()
+
     def blended(self, scene: RenderScene) -> bool:
         """Whether anything is in view that something may be seen through."""
         self._prepare(scene)
@@ -152,7 +159,7 @@ class SurfacePass:
                 batches += self._move((*key, counts[key]), draw)
                 counts[key] += 1
         for old in [k for k, v in self._moving.items() if v.used < self._frame - _KEEP]:
-            _release(self._moving.pop(old).batches)
+            release(self._moving.pop(old).batches)
         self._choose(scene, batches)
         self._shared = self._frame_uniforms(scene)
 
@@ -175,12 +182,12 @@ class SurfacePass:
         self._inputs = inputs
         if not fits:
             for moving in self._moving.values():
-                _release(moving.batches)
+                release(moving.batches)
             self._moving.clear()
         return fits
 
     def _build_still(self, draws: tuple[Draw, ...]) -> None:
-        _release(self._batches)
+        release(self._batches)
         self._still, self._batches = draws, []
         groups: dict[State, list[tuple[Mesh, Doubles]]] = {}
         for draw in draws:
@@ -206,7 +213,7 @@ class SurfacePass:
             return []
         if kept is None or mesh is not kept.mesh or not self._moved(kept, draw):
             if kept is not None:
-                _release(kept.batches)
+                release(kept.batches)
             batches = list(instanced(self.ctx, mesh, draw.transforms, self._state(draw)))
             kept = self._moving[key] = _Moving(draw, mesh, batches, self._frame)
         kept.draw, kept.used = draw, self._frame
@@ -322,11 +329,6 @@ _SIDES = {False: {"back_sign": floats(1.0)}, True: {"back_sign": floats(-1.0)}}
 def _same(a: Sequence[Draw], b: Sequence[Draw]) -> bool:
     """Whether two lists hold the very same draws."""
     return len(a) == len(b) and all(x is y for x, y in zip(a, b, strict=True))
-
-
-def _release(batches: Sequence[Batch]) -> None:
-    for batch in batches:
-        batch.release()
 
 
 def set_used(program: moderngl.Program, name: str, value: object) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.gpu.context import describe
+from hdrusd.gpu.release import release
 from hdrusd.photometry.reflectance import reflectance_table
 from hdrusd.scene import ImageData, Material, TextureRef
 
@@ -169,6 +170,14 @@ class TextureCache:
             self._keep(ref, wanted, self._decode(ref, wanted))
         self._used[ref] = self._list
         return self._kept[ref]
+
+    def release(self) -> None:
+        """Give all of them back; those that are asked for later are read anew."""
+        release([made.texture for made in self._kept.values() if made is not None])
+        release([texture for _, texture in self._retired])
+        for kept in (self._kept, self._holds, self._seen, self._used, self._retired):
+            kept.clear()
+        self._materials = ()
 
     def _wanted(self, materials: Iterable[Material]) -> dict[TextureRef, Wanted]:
         """What materials not seen before read, by texture."""

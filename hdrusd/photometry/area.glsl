@@ -1,39 +1,8 @@
 // Area lights: lux per candela on the axis; twin of photometry/area.py
+#include "photometry/arc.glsl"
 
 const float AREA_FAR2 = 2500.0;  // half diagonals, squared, beyond which four points stand for all
 const int AREA_SIDES = 64;
-
-// rad of sine >= 0 and cosine times any positive number; Abramowitz and Stegun 4.4.49.
-float arc_angle(float sine, float cosine)
-{
-    float c = abs(cosine);
-    float t = min(sine, c) / max(max(sine, c), 1e-30);
-    float t2 = t * t;
-    float p = 0.0028662257 * t2 - 0.0161657367;
-    p = p * t2 + 0.0429096138;
-    p = p * t2 - 0.0752896400;
-    p = p * t2 + 0.1065626393;
-    p = p * t2 - 0.1420889944;
-    p = p * t2 + 0.1999355085;
-    p = p * t2 - 0.3333314528;
-    float angle = t + t * t2 * p;
-    angle = sine > c ? 1.57079632679490 - angle : angle;
-    return cosine < 0.0 ? 3.14159265358979 - angle : angle;
-}
-
-// arctan(t) - t for t >= 0, without a difference where t is small.
-float arc_excess(float tangent)
-{
-    float t2 = min(tangent * tangent, 1.0);
-    float p = 0.0028662257 * t2 - 0.0161657367;
-    p = p * t2 + 0.0429096138;
-    p = p * t2 - 0.0752896400;
-    p = p * t2 + 0.1065626393;
-    p = p * t2 - 0.1420889944;
-    p = p * t2 + 0.1999355085;
-    p = p * t2 - 0.3333314528;
-    return tangent < 1.0 ? tangent * t2 * p : arc_angle(tangent, 1.0) - tangent;
-}
 
 // Which part of a line is above the horizon, from the heights of its ends.
 vec2 seen_part(float first, float last)

@@ -25,6 +25,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hdrusd.photometry.arc import arc_angle, arc_excess
+
 Array = npt.NDArray[Any]
 
 #: Distance in half diagonals of a light beyond which four points stand for it: the error is
@@ -44,19 +46,6 @@ STRIP_WEIGHTS = (0.3943905576280672, 0.2216925320225176, 0.0505835770160819)
 def dot(a: Array, b: Array) -> Array:
     """Scalar product along the last axis."""
     return np.asarray(np.sum(np.asarray(a) * b, axis=-1))
-
-
-def arc_angle(sine: Array, cosine: Array) -> Array:
-    """The angle in [0, pi] rad of sine >= 0 and cosine times any positive number; 0 of (0, 0).
-
-    The shader's twin is Abramowitz and Stegun 4.4.49, good to 2e-8 of the angle.
-    """
-    return np.asarray(np.arctan2(sine, cosine))
-
-
-def arc_excess(tangent: Array) -> Array:
-    """arctan(t) - t for t >= 0, which the shader must not take as a difference where t is small."""
-    return np.asarray(np.arctan(tangent) - tangent)
 
 
 def seen_part(first: Array, last: Array) -> Array:

@@ -20,15 +20,13 @@ vec3 fresnel(vec3 f0, vec3 f90, float weight)
     return f0 + (f90 - f0) * weight;
 }
 
-// x: sin^2 of the angle between N and H, y: V.H. Unit vectors; nl, nv: N.L, N.V.
-vec2 half_angles(vec3 normal, vec3 light, vec3 view, float nl, float nv)
+// Of H = L + V, x: the square of its part in the surface, y: its own, 4 (V.H)^2. Unit vectors;
+// nl, nv: N.L, N.V.
+vec2 half_squares(vec3 normal, vec3 light, vec3 view, float nl, float nv)
 {
-    float along = nl + nv;
     vec3 h = light + view;
-    vec3 s = h - normal * along;
-    float h2 = dot(h, h);
-    float inverse = inversesqrt(max(h2, 1e-12));
-    return vec2(along > 0.0 ? dot(s, s) * inverse * inverse : 1.0, 0.5 * h2 * inverse);
+    vec3 s = h - normal * max(nl + nv, 0.0);
+    return vec2(dot(s, s), max(dot(h, h), 1e-8));
 }
 
 // c + sqrt(alpha^2 + (1 - alpha^2) c^2); 1 / (that of N.L times that of N.V) is G / (4 N.L N.V).
@@ -44,11 +42,11 @@ float ggx_gain(float nv, float alpha2, float scale)
     return scale * alpha2 / smith_side(nv, alpha2);
 }
 
-// cd/m2 per lux where all is reflected: D G / (4 N.L N.V).
-float ggx_lobe(float gain, float alpha2, float nl, float sine2)
+// cd/m2 per lux where all is reflected: D G / (4 N.L N.V); squares: half_squares.
+float ggx_lobe_of_half(float gain, float alpha2, float nl, vec2 squares)
 {
-    float d = alpha2 + (1.0 - alpha2) * sine2;
-    return gain / (d * d * smith_side(nl, alpha2));
+    float d = alpha2 * squares.y + (1.0 - alpha2) * squares.x;
+    return gain * (squares.y * squares.y) / (d * d * smith_side(nl, alpha2));
 }
 
 // cd/m2 per lux of a layer that reflects f in a lobe, and of what lies below it.

@@ -60,19 +60,21 @@ def fresnel(f0: Array, f90: Array, weight: Array) -> Array:
     return np.asarray(f0 + (f90 - f0) * np.asarray(weight)[..., None])
 
 
-def half_angles(normal: Array, light: Array, view: Array, nl: Array, nv: Array) -> Array:
-    """(..., 2): sin^2 of the angle between N and H, and V.H. Unit vectors (..., 3).
+def half_squares(normal: Array, light: Array, view: Array, nl: Array, nv: Array) -> Array:
+    """(..., 2): squares of the length of H = L + V in the surface, and of H. Unit vectors (..., 3).
 
-    H = L + V; its part in the surface has no cancellation where H is near N. A half
-    vector that points into the surface counts as lying in it.
+    The part in the surface has no cancellation where H is near N. A half vector that
+    points into the surface counts as lying in it.
     """
-    along = np.asarray(nl + nv)
     h = light + view
-    s = h - normal * along[..., None]
-    h2 = np.sum(h * h, axis=-1)
-    inverse = 1.0 / np.sqrt(np.maximum(h2, 1e-12))
-    sine2 = np.where(along > 0.0, np.sum(s * s, axis=-1) * inverse * inverse, 1.0)
-    return np.stack([sine2, 0.5 * h2 * inverse], axis=-1)
+    s = h - normal * np.maximum(nl + nv, 0.0)[..., None]
+    return np.stack([np.sum(s * s, axis=-1), np.maximum(np.sum(h * h, axis=-1), 1e-8)], axis=-1)
+
+
+def half_angles(normal: Array, light: Array, view: Array, nl: Array, nv: Array) -> Array:
+    """(..., 2): sin^2 of the angle between N and H, and V.H, from ``half_squares``."""
+    part, whole = np.moveaxis(half_squares(normal, light, view, nl, nv), -1, 0)
+    return np.stack([part / whole, 0.5 * np.sqrt(whole)], axis=-1)
 
 
 def smith_side(cosine: Array, alpha2: Array) -> Array:
@@ -96,6 +98,11 @@ def ggx_lobe(gain: Array, alpha2: Array, nl: Array, sine2: Array) -> Array:
     """D G / (4 N.L N.V): luminance per lux (sr^-1) where the Fresnel reflectance is 1."""
     d = alpha2 + (1.0 - alpha2) * sine2
     return np.asarray(gain / (d * d * smith_side(nl, alpha2)))
+
+
+def ggx_lobe_of_half(gain: Array, alpha2: Array, nl: Array, squares: Array) -> Array:
+    """``ggx_lobe`` from ``half_squares`` (..., 2): one quotient a light instead of three."""
+    return ggx_lobe(gain, alpha2, nl, squares[..., 0] / squares[..., 1])
 
 
 def layered(below: Array, f: Array, lobe: Array) -> Array:

@@ -1,24 +1,11 @@
 // Candela of a direction from a grid; twin of photometry/profile.py
+#include "photometry/arc.glsl"
 
-// The angle of the direction (x, y), rad, from -pi to pi; Abramowitz and Stegun 4.4.49, error
-// below 2e-8, because drivers' atan may be worse.
+// The angle of the direction (x, y), rad, from -pi to pi.
 float angle_from_sides(float y, float x)
 {
-    float a = abs(x);
-    float b = abs(y);
-    float t = min(a, b) / max(max(a, b), 1e-30);
-    float s = t * t;
-    float p = 0.0028662257 * s - 0.0161657367;
-    p = p * s + 0.0429096138;
-    p = p * s - 0.0752896400;
-    p = p * s + 0.1065626393;
-    p = p * s - 0.1420889944;
-    p = p * s + 0.1999355085;
-    p = p * s - 0.3333314528;
-    p = (p * s + 1.0) * t;
-    p = b > a ? 1.57079632679490 - p : p;
-    p = x < 0.0 ? 3.14159265358979 - p : p;
-    return y < 0.0 ? -p : p;
+    float angle = arc_angle(abs(y), x);
+    return y < 0.0 ? -angle : angle;
 }
 
 // Plane and angle, rad, of a direction; type: C 0, A 1, B 2.

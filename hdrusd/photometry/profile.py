@@ -165,8 +165,7 @@ def _per_radian(ends: tuple[float, float], intervals: int) -> float:
 def angle_from_sides(y: Array, x: Array) -> Array:
     """The angle in radians of the direction (x, y), from -pi to pi; 0 for (0, 0).
 
-    The shader's twin is the polynomial of Abramowitz and Stegun 4.4.49, good to 2e-8 rad:
-    GLSL 3.30 promises nothing about atan, and Vulkan 1.3 allows 4096 ulp.
+    The shader has it of photometry/arc.glsl.
     """
     return np.asarray(np.arctan2(y, x))
 

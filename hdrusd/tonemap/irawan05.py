@@ -46,7 +46,7 @@ from hdrusd.tonemap.operator import (
 )
 
 #: ln units that a histogram's range has at least, and share of a jump that nobody sees.
-_ONE_LUMINANCE, _FORGOTTEN = 0.02, 1e-6
+_ONE_LUMINANCE, _FORGOTTEN = 0.02, 1e-9
 
 #: Values of a curve that a state may have.
 _MOST_EDGES = 4096
@@ -76,7 +76,8 @@ def seen_curve(
     exponent = number("irawan05", "exponent", moment.parameters["exponent"], 0.7, 1.0)
     both = thresholds(eye, at, np.exp(h.centres), moment.observer, exponent)
     wanted = anchor(eye, at, low, high)
-    return fill(h, low, high, np.minimum(*both), wanted, start=start)
+    bright = number("irawan05", "highlights", moment.parameters["highlights"], 0.0, 1.0)
+    return fill(h, low, high, np.minimum(*both), wanted, highlights=bright, start=start)
 
 
 def _frame(moment: Moment) -> tuple[Foveal, Array | None]:
@@ -217,6 +218,13 @@ OPERATOR = Operator(
         ),
         Parameter(
             "smoothing", 0.2, "s", "in which a change of the picture reaches the curve; 0 for none"
+        ),
+        Parameter(
+            "highlights",
+            0.5,
+            "",
+            "contrast that what is brighter than the eye's adaptation keeps at least, 0 to 1; "
+            "with 0 what dazzles is no brighter than what is just told apart",
         ),
         Parameter("exponent", 1.0, "", "of the receptors' response, 0.7 to 1"),
     ),

@@ -78,7 +78,7 @@ vec3 ocio_trilinear(sampler2D table, vec3 at)
 }
 """
 
-_CODE = """// {title}
+_CODE = """// OpenColorIO
 #include "tonemap/exposure.glsl"
 {interpolation}{text}
 vec3 ocio(vec3 rgb)
@@ -138,9 +138,10 @@ def _config(library: Any, name: str) -> Any:
 
 def _asked(thing: str, name: str, call: Callable[[], Any]) -> Any:
     """What ``call`` returns; the library's complaints as ParameterError."""
+    library = _library()
     try:
         return call()
-    except _library().Exception as error:
+    except (library.Exception, library.ExceptionMissingFile) as error:
         raise ParameterError(one_line(f"ocio: {thing}: {name}: {error}")) from error
 
 
@@ -156,8 +157,9 @@ def _built(config: str, display: str | None, view: str | None, source: str | Non
     library = _library()
     names = {"config": config, "display": display, "view": view, "source": source}
     processor = transform(names)
-    cpu = processor.getOptimizedCPUProcessor(library.OPTIMIZATION_LOSSLESS)
-    text, tables = shader(processor)
+    lossless, said = library.OPTIMIZATION_LOSSLESS, view or "default"
+    cpu = _asked("view", said, lambda: processor.getOptimizedCPUProcessor(lossless))
+    text, tables = _asked("view", said, lambda: shader(processor))
 
     def reference(rgb: Array, uniforms: Uniforms) -> Array:
         light = np.minimum(exposed(rgb, uniforms["exposure_scale"]), _BRIGHTEST)
@@ -194,9 +196,7 @@ def shader(processor: Any) -> tuple[str, dict[str, Array]]:
             raise ParameterError(f"ocio: view: a table of {n} x {n} x {n}; want {_WIDEST} at most")
         tables[cube.samplerName] = np.array(cube.getValues(), np.float32).reshape(n * n, n, 3)
         text = _read_by("ocio_trilinear", cube.samplerName, text)
-    code = _CODE.format(
-        title="OpenColorIO", interpolation=_INTERPOLATION, text=text, brightest=_BRIGHTEST
-    )
+    code = _CODE.format(interpolation=_INTERPOLATION, text=text, brightest=_BRIGHTEST)
     return code, tables
 
 
@@ -234,4 +234,5 @@ OPERATOR = Operator(
     needs=exposure_needs,
     build=_build,
     encoded=True,
+    tone_curve=False,  # a view may be anything; some of ACES 2.0 darken very bright pure colours
 )

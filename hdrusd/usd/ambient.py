@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from pxr import Sdf, Usd, UsdGeom
 
-from hdrusd.errors import SourceRef
 from hdrusd.report import Kind, Report
 from hdrusd.scene import RGB, Sky
 from hdrusd.usd.dome import dome_picture, read_sky
+from hdrusd.usd.findings import prim_finding
 from hdrusd.usd.light import read_dome
 from hdrusd.usd.light_bounds import STRONGEST
 
@@ -57,7 +56,7 @@ def read_ambient(
         if prim.GetPath() in spoken_for:
             if dome_picture(prim, time):
                 text = f"{API} stands for this dome; its picture is not shown"
-                report.add(Kind.DROPPED, "dome-texture", _place(prim), str(prim.GetPath()), text)
+                prim_finding(report, prim, Kind.DROPPED, "dome-texture", text)
             continue
         lux = np.asarray(read_dome(prim, time, report) or (0.0, 0.0, 0.0))
         lux = _sound(lux, prim, report)
@@ -90,12 +89,8 @@ def _sound(lux: npt.NDArray[np.float64], prim: Usd.Prim, report: Report) -> npt.
     if ((lux >= 0.0) & (lux <= STRONGEST)).all():
         return lux
     text = "not finite, negative or too large; left out"
-    report.add(Kind.INVALID, "light-invalid", _place(prim), str(prim.GetPath()), text)
+    prim_finding(report, prim, Kind.INVALID, "light-invalid", text)
     return np.zeros(3)
-
-
-def _place(prim: Usd.Prim) -> SourceRef:
-    return SourceRef(Path(prim.GetStage().GetRootLayer().identifier))
 
 
 def _visible(prim: Usd.Prim, time: Usd.TimeCode) -> bool:

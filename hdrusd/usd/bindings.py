@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
-from hdrusd.errors import SourceRef
 from hdrusd.report import Kind, Report
 from hdrusd.scene import Geometry, Material
+from hdrusd.usd.findings import prim_finding
 from hdrusd.usd.preview import MaterialReader
 
 
@@ -30,7 +29,6 @@ class Bindings:
     def __init__(self, stage: Usd.Stage, report: Report) -> None:
         self.materials: list[Material] = []
         self.report = report
-        self.place = SourceRef(Path(stage.GetRootLayer().identifier))
         self._ids: dict[_Worn, int] = {}
         self._reader = MaterialReader(stage, report)
         self._read_as: dict[Sdf.Path, Material] = {}
@@ -57,7 +55,7 @@ class Bindings:
         for subset in subsets:
             if subset.GetIndicesAttr().ValueMightBeTimeVarying():
                 text = "its faces change in time; those of the first time shown are used"
-                self._finding(subset.GetPrim(), Kind.DROPPED, "subset-animated", text)
+                prim_finding(self.report, subset.GetPrim(), Kind.DROPPED, "subset-animated", text)
             index = np.asarray(subset.GetIndicesAttr().Get(code) or [], np.int64)
             index = index[(index >= 0) & (index < rest.size)]
             faces = np.zeros(rest.size, np.bool_)
@@ -92,7 +90,7 @@ class Bindings:
         colored = not material.vertex_color or _has(prim, material.vertex_color)
         if not colored:
             text = f"no primvar {material.vertex_color}; what stands for it is used"
-            self._finding(prim, Kind.MISSING, "primvar-missing", text)
+            prim_finding(self.report, prim, Kind.MISSING, "primvar-missing", text)
         return _Worn(path, colored=colored, opacity=opacity), material
 
     def _bare(self, prim: Usd.Prim, code: Usd.TimeCode) -> tuple[_Worn, Material]:
@@ -111,20 +109,18 @@ class Bindings:
         primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
         if primvar.ValueMightBeTimeVarying():
             text = f"{name} changes in time; that of the first time shown is used"
-            self._finding(prim, Kind.DROPPED, "opacity-animated", text)
+            prim_finding(self.report, prim, Kind.DROPPED, "opacity-animated", text)
         value = primvar.ComputeFlattened(code)
         values = np.ravel(np.asarray(value if value is not None else []))
         if values.size == 0 or values.dtype.kind not in "fiu" or not np.isfinite(values).all():
-            self._finding(prim, Kind.INVALID, "display-opacity", f"{name} is no finite number")
+            text = f"{name} is no finite number"
+            prim_finding(self.report, prim, Kind.INVALID, "display-opacity", text)
             return None
         low, mean = float(values.min()), float(np.clip(values, 0.0, 1.0).mean())
         if low != float(values.max()):
             text = f"{name} varies over the gprim; its mean {mean:.3g} is used"
-            self._finding(prim, Kind.REPLACED, "display-opacity", text)
+            prim_finding(self.report, prim, Kind.REPLACED, "display-opacity", text)
         return mean
-
-    def _finding(self, prim: Usd.Prim, kind: Kind, code: str, text: str) -> None:
-        self.report.add(kind, code, self.place, str(prim.GetPath()), text)
 
 
 @dataclass(frozen=True, slots=True)

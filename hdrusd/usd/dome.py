@@ -8,17 +8,15 @@ stage whose Z is up, the top row is towards +Z and the middle towards -Y.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import numpy.typing as npt
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
-from hdrusd.errors import SourceRef
 from hdrusd.report import Kind, Report
 from hdrusd.scene import RGB, Sky, TextureRef
 from hdrusd.units import dome_luminance
 from hdrusd.usd.assets import resolved_asset
+from hdrusd.usd.findings import prim_finding
 from hdrusd.usd.light_controls import casts_shadows
 from hdrusd.usd.lux import input_source
 
@@ -37,20 +35,20 @@ def read_sky(
     """
     if prim.GetRelationship("portals").HasAuthoredTargets():
         text = "portals are not used; they change no light, only how it is sampled"
-        _finding(report, prim, "dome-portals", text)
+        prim_finding(report, prim, Kind.DROPPED, "dome-portals", text)
     picture = dome_picture(prim, time)
     if not picture:
         return None
     layout = input_source(prim, "texture:format").Get(time)
     if layout not in _LATLONG:
         text = f"a picture in the format {layout} is not read; the dome is uniform. Want latlong"
-        _finding(report, prim, "dome-texture", text)
+        prim_finding(report, prim, Kind.DROPPED, "dome-texture", text)
         return None
     red, green, blue = (dome_luminance(channel) for channel in lux)
     axes = _orthogonal(np.array(world, np.float64)[:3, :3])
     if axes is None:
         text = "a transform without volume or not finite; the dome is not turned"
-        _finding(report, prim, "dome-transform", text, Kind.INVALID)
+        prim_finding(report, prim, Kind.INVALID, "dome-transform", text)
         axes = np.eye(3)
     if _pole(prim) == "Z":
         axes = np.stack([axes[0], axes[2], -axes[1]])
@@ -87,10 +85,3 @@ def _orthogonal(matrix: npt.NDArray[np.float64]) -> npt.NDArray[np.float64] | No
     largest = float(np.abs(matrix).max())
     u, sizes, v = np.linalg.svd(matrix / largest if largest > 0.0 else matrix)
     return np.asarray(u @ v) if sizes[2] > 1e-9 * sizes[0] else None
-
-
-def _finding(
-    report: Report, prim: Usd.Prim, code: str, text: str, kind: Kind = Kind.DROPPED
-) -> None:
-    place = SourceRef(Path(prim.GetStage().GetRootLayer().identifier))
-    report.add(kind, code, place, str(prim.GetPath()), text)

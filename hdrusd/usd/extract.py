@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
 from pxr import Usd, UsdGeom, UsdLux
 
-from hdrusd.errors import InputError, SourceRef
+from hdrusd.errors import InputError
 from hdrusd.report import Kind, Report
 from hdrusd.scene import RECT, Camera, RenderScene, light_rows
 from hdrusd.units import TEXTURE_GAMMA, dome_luminance
@@ -24,6 +23,7 @@ from hdrusd.usd.bindings import Bindings
 from hdrusd.usd.camera import Conform, framing_camera, read_camera
 from hdrusd.usd.emitters import Emitters, beamed_balls
 from hdrusd.usd.facing import facing
+from hdrusd.usd.findings import place_of, prim_finding
 from hdrusd.usd.gprims import GprimReader
 from hdrusd.usd.instanced_lights import instanced_rows, joined, moved_row
 from hdrusd.usd.instancer import Copies, Instancers
@@ -114,7 +114,9 @@ class StageReader:
         )
         if self.default_sky and not plan.has_light:
             lights, ambient = _default_light(camera), (DEFAULT_SKY,) * 3
-            self._finding(
+            prim_finding(
+                self.report,
+                self.stage.GetPseudoRoot(),
                 Kind.ASSUMED,
                 "default-sky",
                 f"no light: shown under {DEFAULT_SKY:g} lx of sky "
@@ -125,7 +127,8 @@ class StageReader:
         lamps, glows = self.emitters.draws(len(self.bindings.materials), self.profiles.all)
         if not draws and not self.gprims and not lamps and not sky_visible:
             raise InputError(
-                self._place(), "nothing to draw; want meshes or shapes of a purpose that is drawn"
+                place_of(self.stage),
+                "nothing to draw; want meshes or shapes of a purpose that is drawn",
             )
         return RenderScene(
             lights=lights,
@@ -180,7 +183,7 @@ class StageReader:
                 self._cameras[path] = prim
                 return prim
         known = ", ".join(str(prim.GetPath()) for prim in cameras) or "none"
-        raise InputError(self._place(), f"{path}: no such camera; the stage has {known}")
+        raise InputError(place_of(self.stage), f"{path}: no such camera; the stage has {known}")
 
     # -- walking the stage ---------------------------------------------------------------
 
@@ -229,9 +232,8 @@ class StageReader:
         elif is_mesh_light(prim):
             plan.meshes.append(MeshLight(prim, self.bindings, self.unit, self.report))
         else:
-            self._finding(
-                Kind.DROPPED, "light-unknown", f"{prim.GetTypeName()} light is not shown", prim
-            )
+            text = f"{prim.GetTypeName()} light is not shown"
+            prim_finding(self.report, prim, Kind.DROPPED, "light-unknown", text)
 
     # -- one frame -----------------------------------------------------------------------
 
@@ -248,7 +250,7 @@ class StageReader:
                 rows = mesh.rows(cache)
                 if not sound(rows).all() or not len(rows):
                     text = "not finite, negative, too large or without area; left out"
-                    self._finding(Kind.INVALID, "light-invalid", text, mesh.prim)
+                    prim_finding(self.report, mesh.prim, Kind.INVALID, "light-invalid", text)
                     continue
                 self.links.assign(mesh.prim, rows)
                 sp = float(rows["sp"][0])
@@ -263,7 +265,7 @@ class StageReader:
         """Rows as they shine, in tiles where a picture lies on them; notes what is seen."""
         if beamed_balls(rows).any():
             text = "a ball with a cone, focus or photometric file shines and is not seen"
-            self._finding(Kind.DROPPED, "light-not-seen", text, prim)
+            prim_finding(self.report, prim, Kind.DROPPED, "light-not-seen", text)
         picture = self.textures.of(prim, code) if (rows["shape"] == RECT).all() else None
         if picture is None:
             self.emitters.show(rows, moving=moving)
@@ -287,7 +289,7 @@ class StageReader:
                 self.links.assign(light.prim, row)
             if row is None or not sound(row).all():
                 text = "not finite, negative or too large; left out"
-                self._finding(Kind.INVALID, "light-invalid", text, light.prim)
+                prim_finding(self.report, light.prim, Kind.INVALID, "light-invalid", text)
                 return None
             light.row, light.place = row, matrix
         return light.row
@@ -304,17 +306,10 @@ class StageReader:
                 good = sound(rows)
                 if not good.all() or not len(rows):
                     text = "not finite, negative, too large or no lamp; left out"
-                    self._finding(Kind.INVALID, "light-invalid", text, copies.source)
+                    prim_finding(self.report, copies.source, Kind.INVALID, "light-invalid", text)
                 known = self._lamps[copies] = rows[good]
             varies = copies.varies or light_time_varying(copies.source)
             yield self._shown(copies.source, known, code, moving=varies)
-
-    def _place(self) -> SourceRef:
-        return SourceRef(Path(self.stage.GetRootLayer().identifier))
-
-    def _finding(self, kind: Kind, code: str, text: str, prim: Usd.Prim | None = None) -> None:
-        thing = str(prim.GetPath()) if prim else ""
-        self.report.add(kind, code, self._place(), thing, text)
 
 
 def _default_light(camera: Camera) -> npt.NDArray[np.void]:
@@ -331,7 +326,7 @@ def _sky_luminance(ambient: tuple[float, float, float]) -> tuple[float, float, f
 
 def _meters_per_unit(stage: Usd.Stage, report: Report) -> float:
     unit = float(UsdGeom.GetStageMetersPerUnit(stage))
-    place = SourceRef(Path(stage.GetRootLayer().identifier))
+    place = place_of(stage)
     if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
         report.add(
             Kind.ASSUMED,

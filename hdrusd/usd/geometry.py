@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import numpy.typing as npt
 from pxr import Usd, UsdGeom
 
-from hdrusd.errors import SourceRef
 from hdrusd.report import Kind, Report
 from hdrusd.scene import Geometry
 from hdrusd.usd.arrays import rows
 from hdrusd.usd.curves import read_curves
+from hdrusd.usd.findings import prim_finding
 from hdrusd.usd.mesh import Topology, read_mesh
 from hdrusd.usd.points import read_points
 from hdrusd.usd.shapes import shape_surface
@@ -143,5 +141,4 @@ class GeometryReader:
         return self._surface.expand(values[:, :width], interpolation, tri)
 
     def _finding(self, kind: Kind, code: str, text: str) -> None:
-        place = SourceRef(Path(self.prim.GetStage().GetRootLayer().identifier))
-        self.report.add(kind, code, place, str(self.prim.GetPath()), text)
+        prim_finding(self.report, self.prim, kind, code, text)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 from pxr import Sdf, Usd, UsdGeom
 
-from hdrusd.errors import SourceRef
 from hdrusd.report import Kind, Report
+from hdrusd.usd.findings import prim_finding
 from hdrusd.usd.lux import is_light
 from hdrusd.usd.varying import hides, place_varies, visible
 
@@ -60,7 +59,6 @@ class Instancers:
     def __init__(self, stage: Usd.Stage, purposes: Iterable[str], report: Report) -> None:
         self.report = report
         self.purposes = set(purposes)
-        self._place = SourceRef(Path(stage.GetRootLayer().identifier))
         self._prims: list[Usd.Prim] = []
         self._still: dict[Sdf.Path, list[Copies]] = {}
         self._moment: dict[Sdf.Path, list[Copies]] = {}
@@ -96,13 +94,13 @@ class Instancers:
         cache = UsdGeom.XformCache(code)
         outer = np.array(cache.GetLocalToWorldTransform(prim), np.float64)[None]
         limit = min(MOST_VISITED, self._left)
-        walk = _Walk(cache, self.purposes, self.report, self._place, limit)
+        walk = _Walk(cache, self.purposes, self.report, limit)
         first = Copies(prim, outer, np.zeros(1, np.int64), varies)
         content = list(walk.inside(first, (prim.GetPath(),)))
         self._left -= walk.visited
         if walk.stopped:
             text = f"more than {limit} prims in prototypes; the rest is not shown"
-            self.report.add(Kind.DROPPED, "instancer-limit", self._place, str(prim.GetPath()), text)
+            prim_finding(self.report, prim, Kind.DROPPED, "instancer-limit", text)
         return content, varies or walk.varies
 
 
@@ -114,7 +112,6 @@ class _Walk:
         cache: UsdGeom.XformCache,
         purposes: set[str],
         report: Report,
-        place: SourceRef,
         limit: int,
     ) -> None:
         self.limit = limit
@@ -122,7 +119,6 @@ class _Walk:
         self.time = cache.GetTime()
         self.purposes = purposes
         self.report = report
-        self.place = place
         self.varies = False
         self.visited = 0
 
@@ -143,7 +139,7 @@ class _Walk:
         for primvar in UsdGeom.PrimvarsAPI(at.source).GetPrimvarsWithValues():
             if primvar.GetInterpolation() != UsdGeom.Tokens.constant:
                 text = f"{primvar.GetName()}: a value for each copy; all look alike"
-                self._finding(Kind.DROPPED, "instancer-primvars", at.source, text)
+                prim_finding(self.report, at.source, Kind.DROPPED, "instancer-primvars", text)
         mask = instancer.ComputeMaskAtTime(self.time)
         shown = np.asarray(mask, np.bool_) if mask else np.ones(len(indices), np.bool_)
         ids = _whole_numbers(instancer.GetIdsAttr().Get(self.time))
@@ -157,7 +153,7 @@ class _Walk:
             root = stage.GetPrimAtPath(target)
             if not root:
                 text = f"prototype {target} is not there"
-                self._finding(Kind.MISSING, "instancer-prototype", at.source, text)
+                prim_finding(self.report, at.source, Kind.MISSING, "instancer-prototype", text)
             elif chosen.any() or varies:
                 yield from self._prototype(
                     root, at, Copies(root, local[chosen], ids[chosen], varies), chain
@@ -169,7 +165,7 @@ class _Walk:
         count = len(copies.ids) * len(at.ids)
         if count > MOST_COPIES:
             text = f"{count} copies of {root.GetPath()}; want {MOST_COPIES} at most; not shown"
-            self._finding(Kind.DROPPED, "instancer-limit", at.source, text)
+            prim_finding(self.report, at.source, Kind.DROPPED, "instancer-limit", text)
             return
         # Every copy inside every copy of the instancer itself.
         places = (copies.transforms[None] @ at.transforms[:, None]).reshape(-1, 4, 4)
@@ -198,7 +194,7 @@ class _Walk:
                 yield found
             elif source.GetPath() in chain or len(chain) >= _DEEPEST:
                 text = f"a PointInstancer in itself, or more than {_DEEPEST} deep, is not shown"
-                self._finding(Kind.DROPPED, "instancer-content", source, text)
+                prim_finding(self.report, source, Kind.DROPPED, "instancer-content", text)
             else:
                 yield from self.inside(found, (*chain, source.GetPath()))
 
@@ -213,11 +209,8 @@ class _Walk:
         if len(matrices) == len(indices):
             return matrices
         text = f"{len(indices)} prototype indices, {len(matrices)} positions; not drawn"
-        self._finding(Kind.INVALID, "instancer-arrays", instancer.GetPrim(), text)
+        prim_finding(self.report, instancer.GetPrim(), Kind.INVALID, "instancer-arrays", text)
         return None
-
-    def _finding(self, kind: Kind, code: str, prim: Usd.Prim, text: str) -> None:
-        self.report.add(kind, code, self.place, str(prim.GetPath()), text)
 
 
 def mixed(ids: Ids) -> Ids:

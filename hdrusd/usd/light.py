@@ -9,18 +9,17 @@ file's candela are the truth, which UsdLux inputs multiply (usd/profile.py).
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 from pxr import Gf, Sdf, Usd, UsdLux
 
-from hdrusd.errors import SourceRef
 from hdrusd.photometry.light import PhotometricLight
 from hdrusd.report import Kind, Report
 from hdrusd.scene import light_rows
 from hdrusd.units import LUMINANCE_WEIGHTS, distant_luminance, dome_luminance, sphere_luminance
 from hdrusd.usd.area import shape_row
+from hdrusd.usd.findings import prim_finding
 from hdrusd.usd.light_controls import SP_RATIO, light_key, read_controls, scotopic_ratio
 from hdrusd.usd.lux import LuxReading, connection_end, input_number, photometric_file, read_lux
 
@@ -117,7 +116,7 @@ def read_light(prim: Usd.Prim, *, scale: float = 1.0) -> PhotometricLight:
         exponent=exponent,
         radius=reading.radius or 0.05,
         profile=photometric_file(prim),
-        sp=scotopic_ratio(prim, Usd.TimeCode.Default()),
+        sp=scotopic_ratio(prim, Usd.TimeCode.Default()) or 0.0,
         provenance=get("photometric:provenance") or "authored",  # type: ignore[arg-type]
         rule=get("photometric:rule"),
         source=get("photometric:source"),
@@ -158,7 +157,7 @@ def read_light_row(
         row["angle"] = math.radians(min(max(input_number(prim, "angle", time), 0.0), 180.0)) / 2.0
         return row
     if stretched:
-        _finding(report, prim, "light-shape", stretched, Kind.REPLACED)
+        prim_finding(report, prim, Kind.REPLACED, "light-shape", stretched)
     row["position"] = np.array(world.ExtractTranslation()) * meters_per_unit
     _read_shaping(prim, time, row, report)
     return row
@@ -205,7 +204,7 @@ def _photometric(
             f"UsdLux inputs say {luminance:.6g} {unit}, photometry {stated:.6g} {unit}; "
             "the latter is shown"
         )
-        _finding(report, prim, "light-disagreement", text, Kind.ASSUMED)
+        prim_finding(report, prim, Kind.ASSUMED, "light-disagreement", text)
     return stated, color
 
 
@@ -214,12 +213,12 @@ def _note_unused(prim: Usd.Prim, time: Usd.TimeCode, report: Report) -> None:
     for name in ("diffuse", "specular"):
         if input_number(prim, name, time) != 1.0:
             text = f"inputs:{name} of a dome is not used"
-            _finding(report, prim, "light-multiplier", text)
-    if scotopic_ratio(prim, time) != 0.0:
+            prim_finding(report, prim, Kind.DROPPED, "light-multiplier", text)
+    if scotopic_ratio(prim, time) is not None:
         text = f"inputs:{SP_RATIO} of a dome is not used; its colour tells"
-        _finding(report, prim, "light-scotopic", text)
+        prim_finding(report, prim, Kind.DROPPED, "light-scotopic", text)
     if any(p.GetName().startswith("collection:") for p in prim.GetAuthoredProperties()):
-        _finding(report, prim, "light-linking", "a dome lights everything")
+        prim_finding(report, prim, Kind.DROPPED, "light-linking", "a dome lights everything")
 
 
 def _write_shaping(prim: Usd.Prim, light: PhotometricLight) -> None:
@@ -253,7 +252,7 @@ def _read_shaping(
     row["exponent"] += max(focus, 0.0)
     tint = shaping.GetShapingFocusTintAttr().Get(time)
     if tint is not None and any(tint):
-        _finding(report, prim, "focus-tint", "focus tint is not shown")
+        prim_finding(report, prim, Kind.DROPPED, "focus-tint", "focus tint is not shown")
 
 
 def _scaled(scale: float) -> Gf.Matrix4d:
@@ -262,10 +261,3 @@ def _scaled(scale: float) -> Gf.Matrix4d:
 
 def _uniform(prim: Usd.Prim, name: str, kind: Sdf.ValueTypeName, value: object) -> None:
     prim.CreateAttribute(name, kind, False, Sdf.VariabilityUniform).Set(value)
-
-
-def _finding(
-    report: Report, prim: Usd.Prim, code: str, text: str, kind: Kind = Kind.DROPPED
-) -> None:
-    place = SourceRef(Path(prim.GetStage().GetRootLayer().identifier))
-    report.add(kind, code, place, str(prim.GetPath()), text)

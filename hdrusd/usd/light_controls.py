@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from pxr import Usd, UsdLux
 
-from hdrusd.errors import SourceRef
 from hdrusd.report import Kind, Report
+from hdrusd.usd.findings import prim_finding
 from hdrusd.usd.lux import input_number, input_source
 
 #: Inputs of ShadowAPI that are not physical and not read, and when they change nothing.
@@ -42,10 +41,10 @@ def casts_shadows(prim: Usd.Prim, time: Usd.TimeCode) -> bool:
     return not (source and source.Get(time) is False)
 
 
-def scotopic_ratio(prim: Usd.Prim, time: Usd.TimeCode) -> float:
-    """The S/P that a light states, whatever it is; 0 where it states none."""
+def scotopic_ratio(prim: Usd.Prim, time: Usd.TimeCode) -> float | None:
+    """The S/P that a light states, whatever it is; None where it states none."""
     source = input_source(prim, SP_RATIO)
-    return input_number(prim, SP_RATIO, time) if source and source.HasAuthoredValue() else 0.0
+    return input_number(prim, SP_RATIO, time) if source and source.HasAuthoredValue() else None
 
 
 def read_controls(
@@ -54,8 +53,7 @@ def read_controls(
     """Fill ``diffuse``, ``specular``, ``sp`` and ``shadow`` of rows of ``scene.LIGHT``."""
 
     def finding(kind: Kind, code: str, text: str) -> None:
-        place = SourceRef(Path(prim.GetStage().GetRootLayer().identifier))
-        report.add(kind, code, place, str(prim.GetPath()), text)
+        prim_finding(report, prim, kind, code, text)
 
     for name in ("diffuse", "specular"):
         factor = input_number(prim, name, time)
@@ -64,9 +62,9 @@ def read_controls(
             finding(Kind.CLAMPED, "light-multiplier", text)
         rows[name] = np.maximum(factor, 0.0)  # NaN stays, and the light is left out
     ratio = scotopic_ratio(prim, time)
-    if 0.0 < ratio <= _MOST_BLUE:
+    if ratio is not None and 0.0 < ratio <= _MOST_BLUE:
         rows["sp"] = ratio
-    elif ratio != 0.0:
+    elif ratio is not None:
         text = f"inputs:{SP_RATIO} {ratio:g}; want above 0, at most {_MOST_BLUE:g}; not used"
         finding(Kind.INVALID, "light-scotopic", text)
     if prim.HasAPI(UsdLux.ShadowAPI):

@@ -17,12 +17,13 @@ import numpy as np
 import numpy.typing as npt
 from pxr import Sdf, Usd
 
-from hdrusd.errors import InputError, SourceRef
+from hdrusd.errors import InputError
 from hdrusd.images import read_image
 from hdrusd.report import Kind, Report
 from hdrusd.scene import ImageData, TextureRef, TextureUse
 from hdrusd.units import TEXTURE_GAMMA
 from hdrusd.usd.assets import asset_bytes, resolved_asset
+from hdrusd.usd.findings import prim_finding
 from hdrusd.usd.lux import input_source
 
 #: Tiles of a textured light along each side.
@@ -60,7 +61,6 @@ class LightTextures:
     def __init__(self, stage: Usd.Stage, report: Report, *, gamma: float = TEXTURE_GAMMA) -> None:
         self.report = report
         self.gamma = gamma
-        self._place = SourceRef(Path(stage.GetRootLayer().identifier))
         self._known: dict[str, Picture | None] = {}
 
     def of(self, prim: Usd.Prim, time: Usd.TimeCode) -> Picture | None:
@@ -79,8 +79,7 @@ class LightTextures:
             except (InputError, OSError) as problem:
                 self._known[path] = None
                 text = f"{problem}; the light is evenly bright"
-                thing = str(prim.GetPath())
-                self.report.add(Kind.MISSING, "light-texture", self._place, thing, text)
+                prim_finding(self.report, prim, Kind.MISSING, "light-texture", text)
         return self._known[path]
 
 

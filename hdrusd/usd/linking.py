@@ -8,14 +8,13 @@ names it. A copy by a point instancer belongs where its prototype's prim does.
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 from pxr import Sdf, Usd, UsdLux
 
-from hdrusd.errors import SourceRef
 from hdrusd.report import Kind, Report
+from hdrusd.usd.findings import prim_finding
 
 #: Different light links of one stage: the bits that a float32 holds exactly.
 MOST_LINKS = 24
@@ -29,10 +28,8 @@ class Links:
     """The links of the lights of one stage: ``note`` every light, then ask for bits."""
 
     def __init__(self, stage: Usd.Stage, report: Report) -> None:
-        place = SourceRef(Path(stage.GetRootLayer().identifier))
-
         def beyond(prim: Usd.Prim, text: str) -> None:
-            report.add(Kind.DROPPED, "light-linking", place, str(prim.GetPath()), text)
+            prim_finding(report, prim, Kind.DROPPED, "light-linking", text)
 
         self._reach = _Family(MOST_LINKS, "light links; it reaches everything", beyond)
         self._shade = _Family(MOST_EXCLUDED, "shadow links; everything shades it", beyond)

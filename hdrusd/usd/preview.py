@@ -10,15 +10,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pxr import Gf, Usd, UsdShade
 
-from hdrusd.errors import SourceRef
 from hdrusd.report import Kind, Report
 from hdrusd.scene import RGB, Material, TextureRef, TextureUse
+from hdrusd.usd.findings import place_of
 from hdrusd.usd.ggx import build_material, f0_from_ior, level_fallback, note_clearcoat
 from hdrusd.usd.materialx import is_materialx_surface, read_materialx
 from hdrusd.usd.network import (
@@ -59,7 +58,7 @@ class MaterialReader:
 
     def __init__(self, stage: Usd.Stage, report: Report) -> None:
         self.report = report
-        self.place = SourceRef(Path(stage.GetRootLayer().identifier))
+        self.place = place_of(stage)
 
     def read(self, material: UsdShade.Material, time: Usd.TimeCode) -> Material | None:
         """The material at ``time``, or None when it has no surface that we know."""

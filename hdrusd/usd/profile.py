@@ -35,6 +35,7 @@ from hdrusd.photometry.profile import MOST_CELLS, cell_count, even_profile
 from hdrusd.report import Kind, Report
 from hdrusd.scene import Profile
 from hdrusd.usd.assets import asset_bytes, resolved_asset
+from hdrusd.usd.findings import place_of, prim_finding
 from hdrusd.usd.lux import input_number, input_source
 
 _FILE = "shaping:ies:file"
@@ -53,7 +54,7 @@ class Profiles:
 
     def __init__(self, stage: Usd.Stage, report: Report) -> None:
         self.report = report
-        self._place = SourceRef(Path(stage.GetRootLayer().identifier))
+        self._place = place_of(stage)
         self._files: dict[str, _File | None] = {}
         self._numbers: dict[tuple[str, float], int] = {}
         self._cells = 0
@@ -66,7 +67,7 @@ class Profiles:
             return
         if not rows["w"].any():
             text = "a distant light takes no photometric file"
-            self._finding(Kind.DROPPED, "profile-unused", prim, text)
+            prim_finding(self.report, prim, Kind.DROPPED, "profile-unused", text)
             return
         source = input_source(prim, _FILE)
         path = resolved_asset(source, asset)
@@ -79,7 +80,7 @@ class Profiles:
         if normalized:
             rows["intensity"] *= 4.0 * math.pi / file.flux if file.flux > 0.0 else 0.0
             text = "ies:normalize divides by the mean candela of the file, flux / 4 pi"
-            self._finding(Kind.ASSUMED, "profile-normalize", prim, text)
+            prim_finding(self.report, prim, Kind.ASSUMED, "profile-normalize", text)
         rows["profile"] = self._number(path, file.profile, prim, time)
 
     def _asset(self, prim: Usd.Prim, time: Usd.TimeCode) -> Sdf.AssetPath | None:
@@ -94,11 +95,13 @@ class Profiles:
     def _number(self, path: str, profile: Profile, prim: Usd.Prim, time: Usd.TimeCode) -> int:
         scale = input_number(prim, "shaping:ies:angleScale", time)
         if not math.isfinite(scale):
-            self._finding(Kind.INVALID, "profile-angle-scale", prim, "angleScale is no number")
+            prim_finding(
+                self.report, prim, Kind.INVALID, "profile-angle-scale", "angleScale is no number"
+            )
             scale = 0.0
         elif scale != 0.0 and profile.type != "C":
             text = f"angleScale has no meaning for the planes of type {profile.type}"
-            self._finding(Kind.DROPPED, "profile-angle-scale", prim, text)
+            prim_finding(self.report, prim, Kind.DROPPED, "profile-angle-scale", text)
             scale = 0.0
         key = path, scale
         if key not in self._numbers:
@@ -113,11 +116,11 @@ class Profiles:
             except InputError as error:
                 self._files[path] = None
                 text = f"{error}; {_CONSEQUENCE}"
-                self._finding(Kind.INVALID, "profile-invalid", prim, text)
+                prim_finding(self.report, prim, Kind.INVALID, "profile-invalid", text)
             except OSError as error:
                 self._files[path] = None
                 text = f"{path}: {error.strerror or error}; {_CONSEQUENCE}"
-                self._finding(Kind.MISSING, "profile-missing", prim, text)
+                prim_finding(self.report, prim, Kind.MISSING, "profile-missing", text)
         return self._files[path]
 
     def _read(self, path: str) -> _File:
@@ -136,9 +139,6 @@ class Profiles:
             text = f"type {luminaire.type}: its aim is the light's -Z, its right +X, its top +Y"
             self.report.add(Kind.ASSUMED, "profile-axes", place, "", text)
         return _File(profile, luminaire.flux())
-
-    def _finding(self, kind: Kind, code: str, prim: Usd.Prim, text: str) -> None:
-        self.report.add(kind, code, self._place, str(prim.GetPath()), text)
 
 
 _CONSEQUENCE = "left out; with ies:normalize the light would shine evenly"

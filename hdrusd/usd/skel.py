@@ -9,15 +9,14 @@ the skeleton is and not where its own prim is.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
 
-from hdrusd.errors import SourceRef
 from hdrusd.report import Kind, Report
+from hdrusd.usd.findings import prim_finding
 from hdrusd.usd.varying import place_varies
 
 Floats = npt.NDArray[np.float32]
@@ -154,9 +153,8 @@ class Skin:
 
     def _broken(self, text: str) -> None:
         prim = self.query.GetPrim()
-        place = SourceRef(Path(prim.GetStage().GetRootLayer().identifier))
         text = f"{text}; shown without"
-        self.report.add(Kind.INVALID, "skel-binding", place, str(prim.GetPath()), text)
+        prim_finding(self.report, prim, Kind.INVALID, "skel-binding", text)
 
 
 class Skins:
@@ -180,9 +178,8 @@ class Skins:
         skin = self._roots[path].get(prim.GetPath())
         if skin is None or prim.IsA(UsdGeom.Mesh) or (skin.rigid and not skin.points_vary):
             return skin
-        place = SourceRef(Path(prim.GetStage().GetRootLayer().identifier))
         text = f"{prim.GetTypeName()} follows its joints as a whole or not at all; shown without"
-        self.report.add(Kind.DROPPED, "skel-binding", place, str(prim.GetPath()), text)
+        prim_finding(self.report, prim, Kind.DROPPED, "skel-binding", text)
         return None
 
     def _search(self, root: UsdSkel.Root) -> dict[Sdf.Path, Skin]:

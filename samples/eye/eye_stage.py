@@ -20,7 +20,7 @@ import hdrusd.schemas
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "street"))
 
-from street_model import Mesh, Node, Vec3  # noqa: E402
+from street_model import Mesh, Node, Vec3
 
 hdrusd.schemas.register()
 
@@ -39,8 +39,8 @@ class Finish:
 
     With a ``texture`` (sRGB) the reflectance is texture^2.2 times ``reflectance``, the
     luminance is that of the picture's white. ``roughness`` None: matt, no highlight.
-    ``daylight``: a picture of the share of the sky's light that arrives, over the primvar of
-    the same name.
+    ``share`` of the light from everywhere arrives; ``daylight`` names a picture of it over the
+    primvar of that name.
     """
 
     name: str
@@ -50,17 +50,16 @@ class Finish:
     roughness: float | None = None
     f0: float = 0.04
     luminance: float = 0.0  # cd/m2
-    kelvin: float = 0.0  # of the light it gives; 0: white (D65), or ``colour``
+    kelvin: float = 0.0  # of the light it gives; 0: of this colour
     colour: Vec3 = (1.0, 1.0, 1.0)
+    share: float = 1.0
     daylight: str = ""
     source: str = ""  # of the numbers
 
 
-def blackbody(kelvin: float) -> Gf.Vec3f:
-    """Linear Rec. 709 of luminance 1; 0 K stands for white."""
-    if not kelvin:
-        return Gf.Vec3f(1.0)
-    rgb = np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin))
+def tint(kelvin: float, colour: Vec3 = (1.0, 1.0, 1.0)) -> Gf.Vec3f:
+    """Linear Rec. 709 of luminance 1: of a black body, or of ``colour`` where that has 0 K."""
+    rgb = np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin) if kelvin else colour)
     return Gf.Vec3f(*map(float, rgb / (_LUMINANCE @ rgb)))
 
 
@@ -203,9 +202,7 @@ class EyeStage:
         f0 = 0.0 if finish.roughness is None else finish.f0
         shader.CreateInput("specularColor", Types.Color3f).Set(Gf.Vec3f(f0))
         shader.CreateInput("roughness", Types.Float).Set(finish.roughness or 1.0)
-        glow = finish.luminance * np.array(
-            blackbody(finish.kelvin) if finish.kelvin else finish.colour
-        )
+        glow = finish.luminance * np.array(tint(finish.kelvin, finish.colour))
         inputs = {"diffuseColor": (0.0, 0.0, 0.0) if any(glow) else finish.reflectance}
         if any(glow):
             inputs["emissiveColor"] = tuple(map(float, glow))
@@ -219,6 +216,8 @@ class EyeStage:
         if finish.daylight:
             node = self._picture(path, "Daylight", finish.daylight, "daylight", "raw")
             shader.CreateInput("occlusion", Types.Float).ConnectToSource(node, "r")
+        elif finish.share != 1.0:
+            shader.CreateInput("occlusion", Types.Float).Set(finish.share)
         self._provenance(material.GetPrim(), finish)
         self._finishes[finish] = material
         return material
@@ -267,7 +266,9 @@ class EyeStage:
         light.CreateHeightAttr(size[1])
         light.AddTranslateOp().Set(Gf.Vec3d(*centre))
         candela = luminance * size[0] * size[1]
-        return self._light(light, luminance, kelvin, shadows, source, ("luminousIntensity", candela))
+        return self._light(
+            light, luminance, kelvin, shadows, source, ("luminousIntensity", candela)
+        )
 
     def ball(
         self,
@@ -288,14 +289,15 @@ class EyeStage:
         return self._light(light, nits, kelvin, True, source, ("luminousIntensity", candela))
 
     def beam(
-        self, path: str, centre: Vec3, radius: float, file: str, *, kelvin: float, source: str
-    ) -> Usd.Prim:
-        """A lamp that looks along +Y and has the candela of a photometric file."""
+        self, path: str, centre: Vec3, radius: float, file: str, *, tilt: float, kelvin: float,
+        source: str,
+    ) -> Usd.Prim:  # fmt: skip
+        """A lamp that looks along +Y, ``tilt`` degrees up, with the candela of a file."""
         light = UsdLux.SphereLight.Define(self.stage, path)
         light.CreateRadiusAttr(radius)
         light.CreateTreatAsPointAttr(True)
         light.AddTranslateOp().Set(Gf.Vec3d(*centre))
-        light.AddRotateXOp().Set(90.0)  # -Z becomes +Y, +Y becomes +Z
+        light.AddRotateXOp().Set(90.0 + tilt)  # 90: -Z becomes +Y, +Y becomes +Z
         shaping = UsdLux.ShapingAPI.Apply(light.GetPrim())
         shaping.CreateShapingIesFileAttr(f"./{file}")
         nits = 1.0 / (math.pi * radius**2)  # times the file's candela
@@ -327,7 +329,7 @@ class EyeStage:
     ) -> Usd.Prim:
         light.CreateIntensityAttr(nits)
         light.CreateNormalizeAttr(False)
-        light.CreateColorAttr(blackbody(kelvin))
+        light.CreateColorAttr(tint(kelvin))
         prim = light.GetPrim()
         if not shadows:
             UsdLux.ShadowAPI.Apply(prim).CreateShadowEnableAttr(False)
@@ -339,14 +341,17 @@ class EyeStage:
             prim.GetAttribute("photometric:source").Set(source)
         return prim
 
-    def ambient(self, illuminance: float, colour: Vec3 = (1.0, 1.0, 1.0)) -> None:
-        """Light from everywhere alike, lx, and the dome that says so to other renderers."""
-        tint = np.array(colour) / (_LUMINANCE @ np.array(colour))
-        dome = UsdLux.DomeLight.Define(self.stage, "/World/Sky")
-        dome.CreateIntensityAttr(illuminance / math.pi)
-        dome.CreateColorAttr(Gf.Vec3f(*map(float, tint)))
+    def ambient(
+        self, illuminance: float, colour: Vec3 = (1.0, 1.0, 1.0), *, dome: bool = True
+    ) -> None:
+        """Light from everywhere alike, lx; with the dome that says so to other renderers."""
+        hue = tint(0.0, colour)
         root = self.stage.GetDefaultPrim()
         root.ApplyAPI("HdrusdAmbientAPI")
         root.GetAttribute("photometric:ambient:illuminance").Set(illuminance)
-        root.GetAttribute("photometric:ambient:color").Set(Gf.Vec3f(*map(float, tint)))
-        root.GetRelationship("photometric:ambient:light").SetTargets([dome.GetPath()])
+        root.GetAttribute("photometric:ambient:color").Set(hue)
+        if dome:
+            sky = UsdLux.DomeLight.Define(self.stage, "/World/Sky")
+            sky.CreateIntensityAttr(illuminance / math.pi)
+            sky.CreateColorAttr(hue)
+            root.GetRelationship("photometric:ambient:light").SetTargets([sky.GetPath()])

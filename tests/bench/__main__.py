@@ -25,10 +25,11 @@ from hdrusd.convert import Options, convert
 from hdrusd.errors import SourceRef
 from hdrusd.gpu.context import create_context, describe
 from hdrusd.images import write_exr, write_png
+from hdrusd.job import Job
 from hdrusd.legacy.scene import Image, Texture
 from hdrusd.maps import MapWriter
 from hdrusd.photometry.reflectance import reflectance_table
-from hdrusd.render import Job, Renderer, render_sequence
+from hdrusd.render import Renderer, render_sequence
 from hdrusd.report import Report
 from hdrusd.scene import RenderScene, light_rows
 from hdrusd.tonemap.operator import OPERATORS

@@ -24,7 +24,8 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdSkel, Vt
 
 from hdrusd.gpu.context import create_context
 from hdrusd.images import write_exr, write_png
-from hdrusd.render import Job, render_sequence
+from hdrusd.job import Job
+from hdrusd.render import render_sequence
 from hdrusd.report import Report
 
 EVERY = 100

@@ -19,7 +19,8 @@ import numpy as np
 from hdrusd.display import Writer
 from hdrusd.gpu.context import create_context, describe
 from hdrusd.images import write_exr
-from hdrusd.render import Job, Renderer
+from hdrusd.job import Job
+from hdrusd.render import Renderer
 from hdrusd.report import Report
 from hdrusd.scene import Camera
 

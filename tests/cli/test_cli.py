@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -126,6 +127,8 @@ def test_every_default_shown_can_be_given_back(hdrusd: CommandLine) -> None:
     from hdrusd.cli.options import chosen_operator, parse_settings
 
     for name in OPERATORS.names():
+        if name == "ocio" and find_spec("PyOpenColorIO") is None:
+            continue  # an extra
         shown = hdrusd.run("operators", name).out.split("--set ")[1:]
         chosen_operator(name, parse_settings(tuple(s.split(":")[0].split()[0] for s in shown)))
 

@@ -230,6 +230,19 @@ def test_ambient_light_is_the_skys() -> None:
     assert (light.intensity, light.source, light.provenance) == (0.3, "meter", "authored")
 
 
+def test_a_rule_states_what_rods_see_of_a_lamp() -> None:
+    made = interpreter()
+    for stated, sp in (({"sp_ratio": 0.62}, 0.62), ({"illuminant": "HP1"}, 0.56), ({}, 0.0)):
+        light = made.light(lamp(candela=1.0), rule(**stated))
+        assert light is not None
+        assert light.sp == sp
+    assert "light-scotopic" not in made.report.codes()
+    sky = made.light(lamp(kind="ambient"), rule(illuminance=0.3, sp_ratio=2.0))
+    assert sky is not None
+    assert sky.sp == 0.0
+    assert "light-scotopic" in made.report.codes()
+
+
 # -- emission -----------------------------------------------------------------------------
 
 

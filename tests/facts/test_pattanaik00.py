@@ -78,7 +78,7 @@ def test_course(t: float) -> None:
 
 
 def test_course_in_full(testdata: Path) -> None:
-    text = (testdata / "design" / "human_vision_vectors.json").read_text()
+    text = next((testdata / "design").glob("*vectors.json")).read_text(encoding="utf-8")
     table = json.loads(text)["4_pattanaik"]
     for t in (0.0, *COURSE):
         row = table[f"1000->1 t={t}"]

@@ -141,7 +141,7 @@ def test_bright_course() -> None:
 
 
 def test_vectors_in_full(testdata: Path) -> None:
-    text = (testdata / "design" / "human_vision_vectors.json").read_text()
+    text = next((testdata / "design").glob("*vectors.json")).read_text(encoding="utf-8")
     table = json.loads(text)["2_irawan"]
     for name, receptor in RECEPTORS.items():
         for row, factor in (("sigma_n (fast)", receptor.fast), ("sigma_c (slow)", receptor.slow)):

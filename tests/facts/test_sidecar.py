@@ -83,6 +83,7 @@ def test_every_key_is_known(tmp_path: Path) -> None:
     road = sidecar.match("light", "Road_1")
     assert road is not None
     assert (road.values["ies"], road.number("lumens")) == ("road.ies", 5600.0)
+    assert road.sp == 0.56
     assert (road.three("axis"), road.three("c0")) == ((0.0, 0.1, -1.0), (-1.0, 0.0, 0.0))
     material = sidecar.match("material", "Glass")
     assert material is not None
@@ -124,6 +125,9 @@ def test_what_somebody_wrote_down_is_authored_unless_it_says_more(tmp_path: Path
         ("light", "temperature = 0", "temperature"),
         ("light", "temperature = 20000", "temperature"),
         ("light", "radius = 0", "radius"),
+        ("light", "sp_ratio = 0", "sp_ratio"),
+        ("light", 'illuminant = "SON"', "illuminant"),
+        ("light", "illuminant = 1", "illuminant"),
         ("light", "color = [1, 1]", "color"),
         ("light", "color = [1, 1, -1]", "color"),
         ("light", "color = [0, 0, 0]", "color"),

@@ -107,6 +107,20 @@ def test_shadow_links(gl: Any, moving: bool) -> None:
     assert shares == [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]]
 
 
+def test_every_lamp_may_leave_out_a_roof(gl: Any) -> None:
+    """A row of lamps, each without the roof below it; bits beyond the last lamp mean nothing."""
+    count, everything = 20, (1 << 70) - 1
+    links = [everything - (1 << i) for i in range(count)]
+    roofs = [draw(ROOF, 0, move(5 * i, 0, 0), shadow_links=k) for i, k in enumerate(links)]
+    ground = draw(plane(200.0, 0.0, "ground"), shadow_links=everything)
+    places = [(5.0 * i, 0.0, 4.0) for i in range(count)]
+    lamps = [LAMP | {"position": p, "shadow_link": i + 1} for i, p in enumerate(places)]
+    for i in (1, 7, count - 1):
+        # The shadow of its neighbour's roof, 5 m off, falls 5 * 4 / 2.7 m off.
+        points = [(5.0 * i, 0.0, 0.0), (5.0 * i - 20.0 / 2.7, 0.0, 0.0)]
+        assert seen(gl, scene(lamps, ground, *roofs), points, light=i).tolist() == [1.0, 0.0]
+
+
 @pytest.mark.parametrize("moving", [False, True])
 def test_a_cutout_casts_with_its_holes(gl: Any, moving: bool) -> None:
     """A square whose left half has an opacity of 0.2, below the threshold of 0.5."""

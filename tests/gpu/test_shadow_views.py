@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from small_scenes import lights, look
 
 from hdrusd.gpu.cascades import distant_view, view_balls
-from hdrusd.gpu.casters import frustum_sees
-from hdrusd.gpu.shadow_views import BORDER, lit_faces, local_view, widest_angle
+from hdrusd.gpu.shadow_views import BORDER, frustum_sees, lit_faces, local_view, widest_angle
 from hdrusd.scene import CYLINDER, DISK, NO_CONE, Camera, Profile
 
 DOWN = np.array([0.0, 0.0, -1.0])

@@ -33,6 +33,14 @@ def test_line_table_names_every_line(write_shader: Write) -> None:
     assert table["#define LIGHTS 20"] == ("<define>", 1)
 
 
+def test_text_in_place_of_a_file() -> None:
+    made = '// made at run time\n#include "colour.glsl"\nfloat two() { return 2.0; }\n'
+    source = from_text("// outer\n#include MADE", "outer", {"MADE": f'"{made}"'})
+    table = dict(zip(source.text.splitlines(), source.lines, strict=True))
+    assert table["float two() { return 2.0; }"] == ("// made at run time", 3)
+    assert source.files == ("outer", "// made at run time", "colour.glsl")
+
+
 def test_each_file_once(write_shader: Write) -> None:
     common = write_shader("common.glsl", "float one() { return 1.0; }")
     first = write_shader("first.glsl", f'#include "{common}"', "// first")

@@ -20,7 +20,8 @@ import moderngl
 import numpy as np
 
 from hdrusd.images import read_exr
-from hdrusd.render import Job, render_sequence
+from hdrusd.job import Job
+from hdrusd.render import render_sequence
 from hdrusd.report import Report
 from hdrusd.units import LUMINANCE_WEIGHTS
 

@@ -79,38 +79,6 @@ def test_constants_are_the_same() -> None:
     assert f"AREA_SIDES = {area.SIDES};" in TEXT
 
 
-def test_arc_angle(gl: Any) -> None:
-    angle = np.concatenate([[0.0, np.pi / 2, np.pi], rng.uniform(0.0, np.pi, N - 3)])
-    size = np.exp(rng.uniform(-9.0, 9.0, N))
-    sine, cosine = f32(np.maximum(np.sin(angle), 0.0) * size), f32(np.cos(angle) * size)
-    # 2e-8 of the angle; a quotient (2.5 ulp), 16 products and sums of the series that count
-    # with a third at most, and two differences of pi.
-    error = 2e-8 * np.pi + 12 * R * np.pi
-    assert glsl(gl, "arc_angle", sine, cosine) == pytest.approx(
-        area.arc_angle(sine, cosine), abs=error
-    )
-    assert glsl(gl, "arc_angle", np.zeros(2), np.zeros(2)).tolist() == [0.0, 0.0]
-
-
-def test_a_small_angle_is_good_to_its_own_size(gl: Any) -> None:
-    sine = f32(10.0 ** rng.uniform(-8.0, -2.0, N))
-    got = glsl(gl, "arc_angle", sine, np.ones(N))
-    assert got == pytest.approx(np.arctan(sine), rel=2e-8 + 12 * R)
-
-
-def test_arc_excess(gl: Any) -> None:
-    t = f32(10.0 ** rng.uniform(-6.0, 3.0, N))
-    # The series has 2e-8 of t in all, which is 6e-8 of the third of t^3 that is left where
-    # t is 1, and its first term is good to 2e-6 of itself where t is small.
-    wanted = area.arc_excess(t)
-    assert np.abs(glsl(gl, "arc_excess", t) - wanted).max() <= 20 * R * 1e3
-    small = t < 1.0
-    got = glsl(gl, "arc_excess", t)[small]
-    series = -(t**3) / 3 + t**5 / 5 - t**7 / 7
-    exact = np.where(t < 0.03, series, np.arctan(t) - t)[small]
-    assert got == pytest.approx(exact, rel=1e-5)
-
-
 def test_seen_part(gl: Any) -> None:
     first, last = (f32(rng.uniform(-1, 1, N)) for _ in range(2))
     first[:3], last[:3] = (0.0, -1.0, 0.0), (0.0, -1.0, -1.0)

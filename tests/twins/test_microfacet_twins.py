@@ -53,6 +53,7 @@ NL, NV = (f32(np.sum(NORMAL * other, axis=1)) for other in (LIGHT, VIEW))
 COSINE = f32(np.concatenate([[-1, -0.1, -0.0, 0.0, 1e-6, 1.0], rng.uniform(-0.2, 1.0, N - 6)]))
 ALPHA2 = f32(np.exp(rng.uniform(np.log(1e-6), 0.0, N)))
 SINE2 = f32(np.concatenate([[0.0, 1.0], np.exp(rng.uniform(np.log(1e-9), 0.0, N - 2))]))
+SQUARES = f32(np.stack([SINE2, np.ones(N)], 1) * np.exp(rng.uniform(np.log(1e-8), 1.3, (N, 1))))
 F0, F90 = uniform(0.0, 1.0, 3) ** 2, uniform(0.0, 1.0, 3)
 F0 = f32(F0)
 UNIT = uniform(0.0, 1.0)
@@ -64,8 +65,8 @@ def half_error() -> np.ndarray:
     h2 = np.sum(h * h, axis=1)
     s = np.sqrt(np.maximum(h2 - (NL + NV) ** 2, 0.0))
     part = 6 * R * np.sqrt(3.0)
-    sine2 = (2 * s * part + part**2) / h2 + (2 * INVERSE_ROOT + 12 * R)
-    return np.stack([sine2, np.sqrt(h2) * (INVERSE_ROOT + 10 * R)], axis=1)
+    # The three squares and their sum; a half vector that is cut off at the surface is all of it.
+    return np.stack([2 * s * part + part**2 + 12 * R * h2, 12 * R * h2], axis=1)
 
 
 SIDE = ROOT + 6 * R
@@ -75,16 +76,16 @@ CASES: dict[str, tuple[tuple[np.ndarray, ...], Any]] = {
     # The fifth power of a difference, by three products.
     "schlick_weight": ((COSINE,), lambda w: w * 9 * R + SMALLEST),
     "fresnel": ((F0, F90, UNIT), lambda f: np.full((N, 3), 4 * R)),
-    "half_angles": ((NORMAL, LIGHT, VIEW, NL, NV), lambda h: half_error()),
+    "half_squares": ((NORMAL, LIGHT, VIEW, NL, NV), lambda h: half_error()),
     "smith_side": ((COSINE, ALPHA2), lambda s: s * SIDE),
     "ggx_gain": (
         (COSINE, ALPHA2, f32(np.where(np.arange(N) % 2, 1.0, 1 / np.pi))),
         lambda g: g * (SIDE + QUOTIENT + 3 * R),
     ),
-    # The sum under the square has 4 roundings, which count twice.
-    "ggx_lobe": (
-        (f32(np.exp(rng.uniform(-14, 1, N))), ALPHA2, COSINE, SINE2),
-        lambda f: f * (SIDE + QUOTIENT + 12 * R),
+    # The sum under the square has 4 roundings, which count twice; four products more.
+    "ggx_lobe_of_half": (
+        (f32(np.exp(rng.uniform(-14, 1, N))), ALPHA2, COSINE, SQUARES),
+        lambda f: f * (SIDE + QUOTIENT + 14 * R),
     ),
     "layered": ((F90, F0, f32(np.exp(rng.uniform(-9, 12, N)))), lambda f: (np.abs(f) + 1) * 5 * R),
     "coat_reflectance": ((UNIT, UNIT[::-1].copy()), lambda f: f * 5 * R),
@@ -122,8 +123,8 @@ def test_a_narrow_highlight_keeps_its_digits_in_float32(gl: Any) -> None:
     light = 2.0 * (half @ view)[:, None] * half - view
     columns = {"n": np.tile([0.0, 0.0, 1.0], (N, 1)), "l": light, "v": np.tile(view, (N, 1))}
     text = (
-        "ggx_lobe(ggx_gain(dot(n, v), 1e-6, 1.0), 1e-6, dot(n, l),"
-        " half_angles(n, l, v, dot(n, l), dot(n, v)).x)"
+        "ggx_lobe_of_half(ggx_gain(dot(n, v), 1e-6, 1.0), 1e-6, dot(n, l),"
+        " half_squares(n, l, v, dot(n, l), dot(n, v)))"
     )
     got = evaluate(gl, FILE, text, columns, "float")
     alpha2 = np.float64(1e-6)

@@ -10,7 +10,8 @@ import pytest
 from pxr import Usd, UsdGeom
 
 from hdrusd.errors import InputError
-from hdrusd.render import Job, Renderer
+from hdrusd.job import Job
+from hdrusd.render import Renderer
 from hdrusd.report import Report
 from hdrusd.scene import Camera
 from hdrusd.usd.camera import framing_camera

@@ -199,6 +199,16 @@ def test_a_row_is_in_world_metres() -> None:
     assert got["inner"][0] == pytest.approx(math.radians(20.0), rel=2 * ULP)
 
 
+@pytest.mark.parametrize(("sp", "read"), [(0.6, 0.6), (100.5, 0.0), (0.0, 0.0), (-1.0, 0.0)])
+def test_a_row_has_the_stated_ratio_of_rods_to_cones(sp: float, read: float) -> None:
+    prim, _ = written(PhotometricLight("point", 800.0), 1.0, 1.0)
+    assert row(prim)["sp"][0] == 0.0
+    prim.GetAttribute("inputs:photometric:scotopicPhotopicRatio").Set(sp)
+    report = Report()
+    assert row(prim, report=report)["sp"][0] == pytest.approx(read, rel=ULP)
+    assert report.codes() == (set() if read else {"light-scotopic"})
+
+
 def test_a_mirrored_parent_turns_the_axis() -> None:
     prim, _ = written(PhotometricLight("spot", 1.0, cutoff=40.0), 1.0, 1.0)
     UsdGeom.Xformable(prim).AddScaleOp().Set(Gf.Vec3f(1.0, 1.0, -1.0))

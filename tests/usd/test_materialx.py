@@ -11,9 +11,9 @@ import pytest
 from looks import fed, network, node, shown
 from pxr import Sdf, Usd
 
-from hdrusd.usd.opening import open_stage
 from hdrusd.report import Report
 from hdrusd.scene import Material, TextureUse
+from hdrusd.usd.opening import open_stage
 
 SURFACE = "ND_standard_surface_surfaceshader"
 IN = "inputs:in.connect"

@@ -206,6 +206,7 @@ def test_colour_weighs_by_its_luminance() -> None:
         ("float inputs:radius = -1", "inputs:radius -1"),
         ("float inputs:photometric:luminousIntensity = -5", "luminousIntensity -5"),
         ("float inputs:photometric:luminousIntensity = inf", "luminousIntensity inf"),
+        ("float inputs:photometric:scotopicPhotopicRatio = 0", "scotopicPhotopicRatio 0"),
         ("float inputs:intensity.timeSamples = { 1: 1, 2: nan }", "inputs:intensity nan at time 2"),
         ('string inputs:intensity = "bright"', "inputs:intensity 'bright'"),
     ],

@@ -3,7 +3,9 @@
 uniform sampler2D source;  // this level, nearest, black outside
 uniform sampler2D veil;    // so far; with COARSER the next level, linear
 uniform vec2 texel, veil_texel;  // 1 / size
-uniform vec2 weights;      // of the level as it is and blurred
+uniform vec2 plane_corner, plane_texel;  // at distance 1: the frame's corner, sides of a texel
+uniform float inverse_step;  // 1 / step of s between nodes
+uniform vec2 weights[NODES];  // by s, of the level as it is and blurred
 
 layout(location = 0) out vec4 sum;
 
@@ -15,6 +17,11 @@ void main()
 #else
     vec2 q = p;
 #endif
+    vec2 place = plane_corner + (gl_FragCoord.xy - float(MARGIN)) * plane_texel;
+    float node = clamp((1.0 - pow(1.0 + dot(place, place), -0.75)) * inverse_step,
+                       0.0, float(NODES - 1));
+    int low = min(int(node), NODES - 2);
+    vec2 weight = mix(weights[low], weights[low + 1], node - float(low));
     vec4 centre = textureLod(source, p, 0.0);
     vec4 sides = textureLod(source, p - vec2(texel.x, 0.0), 0.0)
                + textureLod(source, p + vec2(texel.x, 0.0), 0.0)
@@ -24,6 +31,6 @@ void main()
                  + textureLod(source, p + texel, 0.0)
                  + textureLod(source, p + vec2(texel.x, -texel.y), 0.0)
                  + textureLod(source, p + vec2(-texel.x, texel.y), 0.0);
-    sum = textureLod(veil, q, 0.0) + (weights.x + 0.25 * weights.y) * centre
-        + weights.y * (0.125 * sides + 0.0625 * corners);
+    sum = textureLod(veil, q, 0.0) + (weight.x + 0.25 * weight.y) * centre
+        + weight.y * (0.125 * sides + 0.0625 * corners);
 }

@@ -14,12 +14,27 @@ noperspective in vec3 ray;     // m; orthographic: from the eye's plane, else al
 #ifdef ORTHOGRAPHIC
 uniform vec3 forward;          // unit vector along the view axis
 #endif
-flat in vec4 data[FIRST * ROWS + CONED * 3];
+flat in vec4 data[FIRST * FIRST_ROWS + CONED * CONED_ROWS];
 layout(location = 0) out vec4 hdr;
 
 uniform float lambert_scale;  // 1/pi, or 1 for petit2010
 #if defined(LINKED) || defined(COATED)
 uniform sampler2D g_extra;    // clear coat: weight, alpha; light links
+#endif
+
+// Of LAMPS and BEAMS, which are of one make: colour, strongest channel 1, and 1/radius^2.
+uniform vec4 lamp_make, beam_make;
+uniform vec2 beam_edge;       // inner, 1/width
+
+// Where nothing else has a colour, that of one make is multiplied when its lamps are added up.
+#if (defined(GGX) && !defined(DIELECTRIC)) || (FIRST > 0 && !defined(LAMPS)) \
+    || (CONED > 0 && !defined(BEAMS))
+#define LUX vec3
+#define OF_MAKE(make, strength) ((make).rgb * (strength))
+#else
+#define LUX float
+#define OF_MAKE(make, strength) (strength)
+#define COLOURLESS
 #endif
 
 // What of a surface every light needs.
@@ -45,8 +60,8 @@ struct Surface {
 
 // What of a light arrives there.
 struct Arrival {
-    vec3 lux;        // on the surface, unobstructed or not, as far as diffuse reflection goes
-    vec3 gloss_lux;  // the same for the highlight
+    LUX lux;         // on the surface, unobstructed or not, as far as diffuse reflection goes
+    LUX gloss_lux;   // the same for the highlight
     vec3 l;          // unit vector that the highlight takes for the light's direction
     float nl;
 #ifdef SIZED
@@ -55,14 +70,24 @@ struct Arrival {
 #endif
 };
 
-// A light of three texels: position, 1/radius^2 | intensity, inner | axis, 1/width.
+#define CONED_TEXEL(i, k) data[FIRST * FIRST_ROWS + (i) * CONED_ROWS + (k)]
+#ifdef BEAMS
+// Two texels: position, strength | axis, 0.
 #define CONE_ARRIVAL(i) \
     Arrival a; \
-    POINT_ARRIVAL(vec4(data[FIRST * ROWS + (i) * 3].xyz, 1.0), data[FIRST * ROWS + (i) * 3 + 1].xyz, \
-                  data[FIRST * ROWS + (i) * 3].w) \
-    a.lux *= cone_factor(-dot(a.l, data[FIRST * ROWS + (i) * 3 + 2].xyz), \
-                         data[FIRST * ROWS + (i) * 3 + 1].w, data[FIRST * ROWS + (i) * 3 + 2].w); \
+    POINT_ARRIVAL(vec4(CONED_TEXEL(i, 0).xyz, 1.0), OF_MAKE(beam_make, CONED_TEXEL(i, 0).w), \
+                  beam_make.w) \
+    a.lux *= cone_factor(-dot(a.l, CONED_TEXEL(i, 1).xyz), beam_edge.x, beam_edge.y); \
     a.gloss_lux = a.lux;
+#else
+// Three texels: position, 1/radius^2 | intensity, inner | axis, 1/width.
+#define CONE_ARRIVAL(i) \
+    Arrival a; \
+    POINT_ARRIVAL(vec4(CONED_TEXEL(i, 0).xyz, 1.0), CONED_TEXEL(i, 1).xyz, CONED_TEXEL(i, 0).w) \
+    a.lux *= cone_factor(-dot(a.l, CONED_TEXEL(i, 2).xyz), CONED_TEXEL(i, 1).w, \
+                         CONED_TEXEL(i, 2).w); \
+    a.gloss_lux = a.lux;
+#endif
 #define POINT_ARRIVAL(place, candela, inverse_radius2) \
     a.l = light_vector((place).xyz, (place).w, s.p); \
     float inverse_d = inversesqrt(max(dot(a.l, a.l), 1e-20)); \
@@ -72,7 +97,7 @@ struct Arrival {
 
 #if defined(SPECIAL)
 #include "gpu/shaders/special_light.glsl"
-#define ARRIVAL(i) Arrival a = special_arrival(s, (i) * ROWS);
+#define ARRIVAL(i) Arrival a = special_arrival(s, (i) * FIRST_ROWS);
 #elif defined(FOCUS)
 // Four texels: position, w | intensity, 1/radius^2 | axis, exponent | inner, 1/width, 0, 0.
 #define ARRIVAL(i) \
@@ -81,6 +106,12 @@ struct Arrival {
     float cosine = -dot(a.l, data[(i) * 4 + 2].xyz); \
     a.lux *= cone_factor(cosine, data[(i) * 4 + 3].x, data[(i) * 4 + 3].y) \
              * focus_factor(cosine, data[(i) * 4 + 2].w); \
+    a.gloss_lux = a.lux;
+#elif defined(LAMPS)
+// One texel: position, strength.
+#define ARRIVAL(i) \
+    Arrival a; \
+    POINT_ARRIVAL(vec4(data[i].xyz, 1.0), OF_MAKE(lamp_make, data[i].w), lamp_make.w) \
     a.gloss_lux = a.lux;
 #else
 // Two texels: position, w | intensity, 1/radius^2.
@@ -91,8 +122,8 @@ struct Arrival {
 #endif
 
 // What reflection a tile has: none but diffuse, BLINN, GGX, or both.
-vec3 sum = vec3(0.0);    // lux that diffuse reflection gets
-vec3 gloss = vec3(0.0);  // cd/m2 of highlights
+LUX sum = LUX(0.0);      // lux that diffuse reflection gets
+LUX gloss = LUX(0.0);    // cd/m2 of highlights
 #if defined(DIELECTRIC)
 uniform float dielectric;  // reflectance at normal incidence of all there is, none of it metal
 float ks, f90;
@@ -110,14 +141,14 @@ vec3 ks;
 void reflect_light(Surface s, Arrival a)
 {
 #if defined(GGX)
-    vec2 half_way = half_angles(s.n, a.l, s.v, a.nl, s.nv);
-    float weight = schlick_weight(half_way.y);
+    vec2 half_way = half_squares(s.n, a.l, s.v, a.nl, s.nv);
+    float weight = schlick_weight(0.5 * sqrt(half_way.y));
 #ifdef DIELECTRIC
     float f = ks + (f90 - ks) * weight;
 #else
     vec3 f = fresnel(ks, f90, weight);
 #endif
-    float lobe = ggx_lobe(gain, alpha2, a.nl, half_way.x) OF_SIZE(alpha2);
+    float lobe = ggx_lobe_of_half(gain, alpha2, a.nl, half_way) OF_SIZE(alpha2);
 #ifdef BLINN
     bool blinn = s.gloss >= 0.0;
     float nh = half_cosine(a.nl, s.nv, dot(s.v, a.l));
@@ -135,7 +166,7 @@ void reflect_light(Surface s, Arrival a)
 #ifdef COATED
     float c = coat_reflectance(coat, weight);
     below *= 1.0 - c;
-    float coat_lobe = ggx_lobe(coat_gain, coat_alpha2, a.nl, half_way.x) OF_SIZE(coat_alpha2);
+    float coat_lobe = ggx_lobe_of_half(coat_gain, coat_alpha2, a.nl, half_way) OF_SIZE(coat_alpha2);
     shine = layered(shine, vec3(c), coat_lobe);
 #endif
     sum += a.lux * below;
@@ -152,18 +183,6 @@ void reflect_light(Surface s, Arrival a)
 #define REFLECT reflect_light(s, a);
 #define ADD(i) { ARRIVAL(i) REFLECT }
 #define ADD_CONE(i) { CONE_ARRIVAL(i) REFLECT }
-
-// ALL_FIRST and ALL_CONED, two of these, apply X to each light of their kind in the batch.
-#define ALL0(X)
-#define ALL1(X) X(0)
-#define ALL2(X) ALL1(X) X(1)
-#define ALL3(X) ALL2(X) X(2)
-#define ALL4(X) ALL3(X) X(3)
-#define ALL5(X) ALL4(X) X(4)
-#define ALL7(X) ALL5(X) X(5) X(6)
-#define ALL8(X) ALL7(X) X(7)
-#define ALL10(X) ALL8(X) X(8) X(9)
-#define ALL15(X) ALL10(X) X(10) X(11) X(12) X(13) X(14)
 
 void main()
 {
@@ -204,9 +223,19 @@ void main()
 #endif
 #endif
     ALL_FIRST(ADD)
-    ALL_CONED(ADD_CONE)
-#if defined(BLINN) && !defined(GGX)
-    gloss *= ks;
+#ifdef COLOURLESS
+    vec3 lux = lamp_make.rgb * sum, shine = lamp_make.rgb * gloss;
+    sum = gloss = 0.0;
 #endif
-    hdr = vec4(lambert(diffuse.rgb, sum, lambert_scale) + gloss, 0.0);
+    ALL_CONED(ADD_CONE)
+#ifdef COLOURLESS
+    lux += beam_make.rgb * sum;
+    shine += beam_make.rgb * gloss;
+#else
+    vec3 lux = sum, shine = gloss;
+#endif
+#if defined(BLINN) && !defined(GGX)
+    shine *= ks;
+#endif
+    hdr = vec4(lambert(diffuse.rgb, lux, lambert_scale) + shine, 0.0);
 }

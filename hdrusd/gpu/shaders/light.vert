@@ -1,6 +1,6 @@
 // One instance is a rectangle of the screen and a batch of lights: its vertices fetch them once.
 // A buffer read in every pixel is what costs on a software device, not the arithmetic.
-// A batch is FIRST lights of ROWS texels and CONED lights (see light.frag) of CONE_ROWS.
+// A batch is FIRST lights of FIRST_ROWS texels and CONED lights (see light.frag) of CONED_ROWS.
 in ivec4 in_area;          // left, bottom, right, top, pixels
 in ivec4 in_list;          // where the two kinds begin in ``order``, and how many: first, n, first, n
 uniform sampler2D lights;  // texels, light after light
@@ -12,8 +12,7 @@ uniform vec3 ray_origin, ray_x, ray_y;  // the window's corner and sides at dist
 uniform vec3 forward;      // unit vector along the view axis
 #endif
 
-#define CONE_ROWS 3
-flat out vec4 data[FIRST * ROWS + CONED * CONE_ROWS];
+flat out vec4 data[FIRST * FIRST_ROWS + CONED * CONED_ROWS];
 noperspective out vec2 window;  // 0 to 1 over the picture
 noperspective out vec3 ray;     // m, from the eye to what it sees there at distance 1
 
@@ -41,15 +40,15 @@ void main()
 #if FIRST > 0
     for (int i = 0; i < FIRST; ++i) {
         int light = i < in_list.y ? light_at(in_list.x + i) : dark.x;
-        for (int k = 0; k < ROWS; ++k)
-            data[i * ROWS + k] = texel(light + k);
+        for (int k = 0; k < FIRST_ROWS; ++k)
+            data[i * FIRST_ROWS + k] = texel(light + k);
     }
 #endif
 #if CONED > 0
     for (int i = 0; i < CONED; ++i) {
         int light = i < in_list.w ? light_at(in_list.z + i) : dark.y;
-        for (int k = 0; k < CONE_ROWS; ++k)
-            data[FIRST * ROWS + i * CONE_ROWS + k] = texel(light + k);
+        for (int k = 0; k < CONED_ROWS; ++k)
+            data[FIRST * FIRST_ROWS + i * CONED_ROWS + k] = texel(light + k);
     }
 #endif
 }

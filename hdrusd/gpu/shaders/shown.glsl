@@ -1,5 +1,6 @@
 // Shader 2 for one pixel: what the screen is told, from cd/m2, by any operator.
 #include "colour.glsl"
+#include "eye/scotopic.glsl"
 #include OPERATOR_GLSL
 
 uniform sampler2D hdr;          // cd/m2, nearest
@@ -25,7 +26,11 @@ vec3 shown(ivec2 p)
 {
     // By coordinates: a texel fetch is checked against the size, which costs a fifth on llvmpipe.
     vec2 place = (vec2(p.x, top_row + row_step * p.y) + 0.5) * texel;
-    vec3 rgb = clean(textureLod(hdr, place, 0.0).rgb);
+    vec4 frame = textureLod(hdr, place, 0.0);
+    vec3 rgb = clean(frame.rgb);
+#ifdef NIGHT  // 1: alpha corrects the scotopic luminance of RGB
+    rgb = night_colour(rgb, white_relative(scotopic(rgb)) * (NIGHT == 1 ? frame.a : 1.0));
+#endif
 #ifdef BLURS
     vec4 blurs[4] = vec4[4](
         textureLod(around_0, place, 0.0),

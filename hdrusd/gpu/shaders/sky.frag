@@ -1,5 +1,6 @@
 // What GGX surfaces mirror of their surroundings, in cd/m2: the split sum of Karis 2013.
 // With PICTURE the sky of a texture, else light from everywhere alike.
+#include "colour.glsl"
 #include "photometry/environment.glsl"
 #include "photometry/microfacet.glsl"
 #include "photometry/sky.glsl"
@@ -51,7 +52,7 @@ void main()
 #ifdef OCCLUDED
     // A mirror is taken to see as much of the sky as the surface does all round.
     vec4 sum = textureLod(arriving, window, 0.0);
-    light *= dot(sum.rgb, vec3(0.2126, 0.7152, 0.0722)) / max(sum.a, 1e-30);
+    light *= luminance(sum.rgb) / max(sum.a, 1e-30);
 #endif
     hdr = vec4(gloss < 0.0 ? light * scale : vec3(0.0), 0.0);
 }

@@ -1,13 +1,14 @@
 // Light of the sky that reaches a surface past all others, from one batch of directions.
 // Result: rgb sum of what arrives, a sum of the luminance that would with nothing in the way;
 // both cd/m2 times cosine.
+#include "colour.glsl"
 #include "gpu/shaders/gbuffer.glsl"
 
 in vec2 window;
 uniform sampler2DShadow depths;  // a tile a direction, seen from outside of everything
 uniform vec4 across[BATCH], along[BATCH];  // place relative to the eye (m), 1: texel of ``depths``
 uniform vec4 towards[BATCH];     // unit vector to the sky; offset of the depth
-uniform vec4 luminance[BATCH];   // cd/m2; factor of the depth, 1/m
+uniform vec4 shining[BATCH];   // cd/m2; factor of the depth, 1/m
 uniform float texel;             // of a tile, m
 uniform vec2 inverse_size;       // 1 / texels of ``depths``
 
@@ -54,9 +55,9 @@ void main()
         vec2 middle = floor(place) + 0.5;
         vec2 lean = vec2(dot(plane, across[i].xyz), dot(plane, along[i].xyz)) * texel;
         float rise = texel * (0.1 + inverse * (0.1 - dot(middle - place, lean)));
-        float z = towards[i].w - (dot(p, towards[i].xyz) + rise) * luminance[i].w;
+        float z = towards[i].w - (dot(p, towards[i].xyz) + rise) * shining[i].w;
         float seen = textureLod(depths, vec3(middle * inverse_size, z), 0.0) * step(0.0, above);
-        vec3 light = front * luminance[i].rgb;
-        sum += vec4(seen * light, dot(light, vec3(0.2126, 0.7152, 0.0722)));
+        vec3 light = front * shining[i].rgb;
+        sum += vec4(seen * light, luminance(light));
     }
 }
