@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -29,10 +30,31 @@ FILE = click.Path(path_type=Path, dir_okay=False)
 FOLDER = click.Path(path_type=Path, file_okay=False, exists=True)
 
 
+def _report_place(ctx: click.Context, option: click.Parameter, path: Path | None) -> Path | None:
+    """Said before the work and not after it: that a report cannot be written there."""
+    if path is None:
+        return None
+    if path.exists() and not path.is_file():
+        raise HdrusdError(f"{path}: not a regular file; see --report")
+    above = next(folder for folder in path.absolute().parents if folder.exists())
+    try:
+        with tempfile.TemporaryFile(dir=above):
+            return path
+    except OSError as problem:
+        text = f"{path}: nothing can be written in {above} ({problem.strerror}); see --report"
+        raise HdrusdError(text) from problem
+
+
 def report_options(function: F) -> F:
     """--report, --strict, --json, --quiet."""
     for option in (
-        click.option("--report", "report_file", type=FILE, help="Write all findings as JSON."),
+        click.option(
+            "--report",
+            "report_file",
+            type=FILE,
+            callback=_report_place,
+            help="Write all findings as JSON.",
+        ),
         click.option("--strict", is_flag=True, help=f"Exit with {STRICT} when there are findings."),
         click.option(
             "--json", "as_json", is_flag=True, help="Print the result as one JSON object."
@@ -105,8 +127,6 @@ def tell(report: Report, quiet: bool) -> None:
 
 def write_report(path: Path, document: dict[str, Any]) -> None:
     """Write JSON under a temporary name, then rename."""
-    if path.exists() and not path.is_file():
-        raise HdrusdError(f"{path}: not a regular file; see --report")
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:

@@ -188,13 +188,9 @@ class _Eye:
         assert eye is not None
         if self.showing.stills:
             eye.course = self.showing.course()
-        frame: Any = rgb
-        options: dict[str, Any] = {}
-        if self._gpu is not None:
-            frame, options = self._gpu.upload(rgb), {"top_first": True}
         if not picture:
-            return eye.see(frame, sight, **options), None
-        shown = eye.show(frame, sight, **options)
+            return eye.see_array(rgb, sight), None
+        shown = eye.show_array(rgb, sight)
         return shown.moment, shown
 
     def release(self) -> None:

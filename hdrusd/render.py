@@ -144,8 +144,7 @@ class Renderer:
         if self.eye is not None and self.viewing is not None:
             sight = self._sight(self.viewing, scene, camera, time)
             if rods is not None and self.viewing.night_colour:
-                texture = self.eye.upload(with_rods(hdr, rods))
-                shown = self.eye.show(texture, replace(sight, rods=True), top_first=True)
+                shown = self.eye.show_array(with_rods(hdr, rods), replace(sight, rods=True))
             else:
                 shown = self.eye.show(texture, sight)
             moment, ldr = shown.moment, shown.picture

@@ -125,22 +125,34 @@ class Eye:
         self._glare = GlarePass(ctx, programs)
         self._acuity = AcuityPass(ctx, programs)
 
-    def see(self, hdr: moderngl.Texture, sight: Sight, *, top_first: bool = False) -> Moment:
-        """Adapt to an RGB(A) float texture in cd/m2, without a picture of it."""
-        return self._adapt(self._veiled(hdr, sight, top_first), sight, top_first)
+    def show(self, hdr: moderngl.Texture, sight: Sight) -> Shown:
+        """Adapt to an RGBA float texture in cd/m2, bottom row first, and the picture of it."""
+        return self._show(hdr, sight, top_first=False)
 
-    def show(self, hdr: moderngl.Texture, sight: Sight, *, top_first: bool = False) -> Shown:
-        """Adapt to a texture in cd/m2, and the picture of it."""
+    def show_array(self, frame: npt.NDArray[np.float32], sight: Sight) -> Shown:
+        """As ``show``, for a frame (h, w, 3 or 4), top row first."""
+        texture, top_first = self._upload(frame)
+        return self._show(texture, sight, top_first)
+
+    def see_array(self, frame: npt.NDArray[np.float32], sight: Sight) -> Moment:
+        """Adapt to a frame without a picture of it."""
+        texture, top_first = self._upload(frame)
+        return self._adapt(self._veiled(texture, sight), sight, top_first)
+
+    def _upload(self, frame: npt.NDArray[np.float32]) -> tuple[moderngl.Texture, bool]:
+        """The frame as a texture, and whether its top row is first."""
+        if self.viewing.acuity and frame.shape[2] == 3:  # AcuityPass wants four channels
+            frame = np.concatenate([frame, np.ones_like(frame[..., :1])], axis=-1)
+        # The levels of a veil begin at the bottom row.
+        top_first = self.viewing.glare is None
+        return self.mapper.upload(frame if top_first else frame[::-1]), top_first
+
+    def _show(self, hdr: moderngl.Texture, sight: Sight, top_first: bool) -> Shown:
         viewing = self.viewing
-        veiled = self._veiled(hdr, sight, top_first)
+        sharp = veiled = self._veiled(hdr, sight)
         moment = self._adapt(veiled, sight, top_first)
-        sharp = veiled
-        if (
-            viewing.acuity
-            and moment.statistics is not None
-            and moment.statistics.foveal is not None
-        ):
-            sharp = self._acuity.apply(veiled, moment.statistics.foveal, top_first=top_first)
+        if viewing.acuity:
+            sharp = self._acuity.apply(veiled, _foveal(moment), top_first=top_first)
         night = NIGHT if viewing.night_colour else None
         picture = self.mapper.apply(
             sharp, viewing.operator, moment, night=night, rods=sight.rods, top_first=top_first
@@ -148,26 +160,17 @@ class Eye:
         add_legend(picture, viewing.operator, moment)
         return Shown(picture, moment)
 
-    def upload(self, frame: npt.NDArray[np.float32]) -> moderngl.Texture:
-        """A frame (h, w, 3 or 4), top row first, as a texture whose top row is first."""
-        if self.viewing.acuity and frame.shape[2] == 3:  # AcuityPass wants four channels
-            frame = np.concatenate([frame, np.ones_like(frame[..., :1])], axis=-1)
-        return self.mapper.upload(frame)
-
     def release(self) -> None:
         """Free what is on the GPU."""
         for part in (self.mapper, self.measurer, self._glare, self._acuity):
             part.release()
 
-    def _veiled(self, hdr: moderngl.Texture, sight: Sight, top_first: bool) -> moderngl.Texture:
+    def _veiled(self, hdr: moderngl.Texture, sight: Sight) -> moderngl.Texture:
         viewing = self.viewing
         if viewing.glare is None:
             return hdr
         angles = sight.field or default_field(*hdr.size)
-        lamps = sight.lamps
-        if lamps is not None and top_first:
-            lamps = lamps * np.array([1.0, -1.0, 1.0, 1.0, 1.0, 1.0])
-        return self._glare.veil(hdr, angles, viewing.glare, viewing.observer, lamps)
+        return self._glare.veil(hdr, angles, viewing.glare, viewing.observer, sight.lamps)
 
     def _adapt(self, hdr: moderngl.Texture, sight: Sight, top_first: bool) -> Moment:
         moment = self.viewing.moment(sight.parameters)
@@ -184,11 +187,11 @@ class ReferenceEye:
         self.viewing = viewing
         self.course = course
 
-    def see(self, frame: npt.ArrayLike, sight: Sight) -> Moment:
+    def see_array(self, frame: npt.NDArray[np.float32], sight: Sight) -> Moment:
         """Adapt to a frame (h, w, 3 or 4) in cd/m2, without a picture of it."""
         return self._adapt(self._veiled(clean(frame), sight), sight)
 
-    def show(self, frame: npt.ArrayLike, sight: Sight) -> Shown:
+    def show_array(self, frame: npt.NDArray[np.float32], sight: Sight) -> Shown:
         """Adapt to a frame, and the picture of it."""
         viewing, operator = self.viewing, self.viewing.operator
         sharp = self._veiled(clean(frame), sight)

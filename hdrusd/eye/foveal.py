@@ -161,7 +161,7 @@ def gaze_weights(size: tuple[int, int], field: tuple[float, float], spread: floa
 
 
 def log_mean(y: npt.ArrayLike, weights: npt.ArrayLike | None = None) -> float:
-    """exp of the weighted mean of ln luminance: what the eye adapts to, cd/m2.
+    """Weighted geometric mean of luminance: what the eye adapts to, cd/m2.
 
     Of samples and weights of one shape; 1 each without weights. Samples of VOID and less show
     nothing that was modelled, and do not count; a frame of nothing else is DARKEST.

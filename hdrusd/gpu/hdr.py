@@ -31,7 +31,14 @@ import numpy.typing as npt
 from hdrusd.errors import SourceRef
 from hdrusd.gpu.casters import Casters
 from hdrusd.gpu.light_tables import Extras
-from hdrusd.gpu.lights import PROFILE_UNIT, SAMPLES, SHADOW_UNIT, LightMode, LightPass
+from hdrusd.gpu.lights import (
+    PROFILE_UNIT,
+    SAMPLES,
+    SHADOW_UNIT,
+    LightMode,
+    LightPass,
+    common_specular,
+)
 from hdrusd.gpu.peeling import MAX_LAYERS, Peeling
 from hdrusd.gpu.profiles import PROFILE, ProfileAtlas
 from hdrusd.gpu.program import Programs
@@ -52,7 +59,8 @@ Reflection = Literal["lambert", "petit2010"]
 #: Factor between R E and luminance: Lambert's 1/pi, and the paper's 1.
 REFLECTION_SCALE: dict[str, float] = {"lambert": 1.0 / math.pi, "petit2010": 1.0}
 
-#: Layers of the G-buffer, in the order of their attachment; the last only where it is needed.
+#: Layers of the G-buffer, in the order of their attachment; g_specular and the last only where
+#: they are needed.
 LAYERS = ("g_normal", "g_diffuse", "g_specular", "hdr", "g_extra")
 
 
@@ -122,11 +130,12 @@ class HdrRenderer:
                 self.place,
             )
         self._scattered = self._texture() if options.sky_samples else None
-        self._layers = {name: self._texture() for name in LAYERS[:-1]}
+        self._layers = {name: self._texture() for name in ("g_normal", "g_diffuse", "hdr")}
+        self._one_specular: float | None = 0.0  # what g_specular has all over, without a target
         self._depth = ctx.depth_texture(size)
         self._gbuffer = self._attached()
         self._frame = ctx.framebuffer([self._layers["hdr"]], self._depth)
-        self._distances = ctx.framebuffer([self._layers["g_normal"]], self._depth)
+        self._distances = ctx.framebuffer([self._layers["g_normal"]])
         self._peeling: Peeling | None = None
         self._told_merged = False
         self._samples = tuple(offsets(options.samples))
@@ -181,7 +190,11 @@ class HdrRenderer:
         Of the opaque surfaces alone, 0 where there is none; of a supersampled frame its
         last sample.
         """
-        values = self._read(self._layers[name])
+        if name == "g_specular" and self._one_specular is not None:
+            w, h = self.size
+            values = np.full((h, w, 4), [*[self._one_specular] * 3, 0.0], np.float32)
+        else:
+            values = self._read(self._layers[name])
         if name == "hdr":
             return values
         return np.where(self._read(self._layers["g_normal"])[..., 3:] != 0.0, values, 0.0)
@@ -195,6 +208,8 @@ class HdrRenderer:
         del layers["hdr"]
         if not extra:
             layers.pop("g_extra", None)
+        if self._one_specular is not None:
+            layers.pop("g_specular", None)
         arriving = None
         if self._occlusion is not None:
             assert self._scattered is not None
@@ -208,16 +223,23 @@ class HdrRenderer:
     def draw_surfaces(self, scene: RenderScene) -> None:
         """Step one: G-buffer, and emission plus ambient in the frame."""
         ctx = self.ctx
-        extra = _needs_extra(scene)
-        if extra and "g_extra" not in self._layers:
+        # A sky's mirror image is no lamp's: sky.frag looks it up.
+        one_specular = None if scene.skies else common_specular(scene.materials)
+        if one_specular is None and "g_specular" not in self._layers:
+            self._layers["g_specular"] = self._texture()
+        extra = _needs_extra(scene) and "g_extra" not in self._layers
+        if extra:
             self._layers["g_extra"] = self._texture()
-            self._gbuffer.release()
-            self._gbuffer = self._attached()
             if self._peeling is not None:
                 self._peeling.release()
                 self._peeling = None
+        other = (one_specular is None) != (self._one_specular is None)
+        self._one_specular = one_specular
+        if extra or other:
+            self._gbuffer.release()
+            self._gbuffer = self._attached()
         # What else the G-buffer holds is read only where there is a surface.
-        self._distances.clear(depth=1.0)
+        self._distances.clear()
         self._frame.clear(*scene.background, 0.0)
         self._gbuffer.use()
         ctx.enable_only(moderngl.DEPTH_TEST)
@@ -225,6 +247,7 @@ class HdrRenderer:
         self.surfaces.draw(
             scene,
             sky=self.skies.lux_coefficients(scene) if scene.skies else None,
+            one_specular=one_specular is not None,
             extra="g_extra" in self._layers,
             sky_apart=self._occlusion is not None,
         )
@@ -276,7 +299,10 @@ class HdrRenderer:
     def _attached(self) -> moderngl.Framebuffer:
         """The G-buffer, with what is scattered of the sky where that comes later."""
         apart = [self._scattered] if self._scattered is not None else []
-        return self.ctx.framebuffer([*self._layers.values(), *apart], self._depth)
+        left_out = "g_specular" if self._one_specular is not None else ""
+        names = [name for name in LAYERS if name in self._layers and name != left_out]
+        targets = [*(self._layers[name] for name in names), *apart]
+        return self.ctx.framebuffer(targets, self._depth)
 
     def _extras(self, scene: RenderScene) -> Extras:
         """What does not depend on where in a pixel is looked: profiles and shadows."""

@@ -112,7 +112,10 @@ class LightPass:
             return
         dielectric = common_dielectric(scene.materials)
         alike = dielectric is not None and not table.merged
-        bounds = self.tile_bounds(layers, not alike and any(map(shines, scene.materials)))
+        glossy: tuple[str, ...] = ()
+        if not alike and any(map(shines, scene.materials)):
+            glossy = ("GLOSSY",) if dielectric is None else ("GLOSSY", "DIELECTRIC")
+        bounds = self.tile_bounds(layers, glossy)
         if alike:
             bounds = replace(bounds, gloss=np.full_like(bounds.gloss, 2))
         regions = self._regions(table, bounds, scene.camera)
@@ -194,9 +197,11 @@ class LightPass:
             regions.append(_Region(int(kind), areas, table.everywhere(len(areas))))
         return regions
 
-    def tile_bounds(self, layers: Mapping[str, moderngl.Texture], glossy: bool) -> TileBounds:
-        """Reduce the G-buffer to its tiles and read that."""
-        defines: dict[str, Any] = {"TILE": TILE} | ({"GLOSSY": 1} if glossy else {})
+    def tile_bounds(
+        self, layers: Mapping[str, moderngl.Texture], glossy: Sequence[str] = ()
+    ) -> TileBounds:
+        """Reduce the G-buffer to its tiles and read that; ``glossy``: #defines."""
+        defines: dict[str, Any] = {"TILE": TILE} | dict.fromkeys(glossy, 1)
         vao = self.programs.fullscreen("gpu/shaders/tile_bounds.frag", defines)
         self._bounds_frame.use()
         self.ctx.enable_only(moderngl.NOTHING)
@@ -369,6 +374,11 @@ def common_dielectric(materials: Sequence[Material]) -> float | None:
         return None
     r, g, b = values.pop()
     return r if r == g == b and r > 0.0 else None
+
+
+def common_specular(materials: Sequence[Material]) -> float | None:
+    """What all surfaces have for g_specular, without colour and none of it metal; else None."""
+    return common_dielectric(materials) if any(map(shines, materials)) else 0.0
 
 
 def runs(chosen: npt.NDArray[np.bool_], size: tuple[int, int]) -> Ints:

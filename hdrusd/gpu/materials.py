@@ -33,6 +33,18 @@ _FIELDS = {
 #: Where a field's uniform has another name: "normal" is the vertices'.
 _UNIFORM = {"normal": "bump"}
 
+#: What uniforms mostly are, and how GLSL says it: then they are no uniforms (gbuffer.frag).
+_USUAL = {
+    "diffuse": (0.0, "vec3(0.0)"),  # with a texture
+    "diffuse_scale": (1.0, "vec3(1.0)"),
+    "emission": (0.0, "vec3(0.0)"),
+    "metallic": (0.0, "0.0"),
+    "occlusion": (1.0, "1.0"),
+}
+
+#: Of texture coordinates to themselves.
+_IDENTITY = np.eye(2, 3)
+
 
 @dataclass(frozen=True, slots=True)
 class MaterialInputs:
@@ -108,7 +120,13 @@ def material_inputs(material: Material, textures: TextureCache) -> MaterialInput
         defines["UV_SETS"] = f"int[]({', '.join(map(str, fetches.uv_sets))})"
         matrices = np.array(fetches.matrices)
         uniforms["image_u"], uniforms["image_v"] = floats(matrices[:, 0]), floats(matrices[:, 1])
+        if np.all(matrices == _IDENTITY):
+            defines["PLAIN_PLACES"] = 1
         uniforms["images"] = np.arange(len(fetches.images), dtype=np.int32).tobytes()
+    for name, (value, text) in _USUAL.items():
+        if name in uniforms and np.all(np.frombuffer(uniforms[name], np.float32) == value):
+            del uniforms[name]
+            defines[name.upper()] = text
     layout = tuple(sets), material.vertex_color
     return MaterialInputs(material, defines, uniforms, tuple(fetches.images), layout)
 

@@ -94,6 +94,7 @@ class SurfacePass:
         which: Literal["opaque", "blended"] = "opaque",
         *,
         sky: npt.NDArray[np.float32] | None = None,
+        one_specular: bool = False,
         extra: bool = False,
         sky_apart: bool = False,
         between: Between | None = None,
@@ -101,9 +102,9 @@ class SurfacePass:
         """The surfaces of a scene; depth test on, colour attachments as in gbuffer.frag.
 
         ``sky``: (18, 3) coefficients of ``ambient_lux`` (photometry/sky.py) instead of
-        ``scene.ambient``. ``extra``: g_extra is attached, and written. ``sky_apart``:
-        so is g_scattered, and no light of the sky is added. ``between``: only the parts
-        between two layers.
+        ``scene.ambient``. ``one_specular``: g_specular is not attached. ``extra``: g_extra
+        is, and written. ``sky_apart``: so is g_scattered, and no light of the sky is added.
+        ``between``: only the parts between two layers.
         """
         self._prepare(scene)
         defines: dict[str, Define] = {}
@@ -111,10 +112,17 @@ class SurfacePass:
         if sky is not None:
             defines["SKY"] = 1
             shared["sky"] = floats(sky)
+        elif not any(scene.ambient):
+            defines["DARK"] = 1
+        attached = 4
+        if one_specular:
+            defines["ONE_SPECULAR"] = 1
+            attached -= 1
         if extra:
-            defines["EXTRA"] = 1
-        if sky_apart:  # the last of the attachments
-            defines["SKY_APART"] = 5 if extra else 4
+            defines["EXTRA"] = attached
+            attached += 1
+        if sky_apart:
+            defines["SKY_APART"] = attached
         if between is not None:
             defines["PEEL"] = 1
             between.opaque.use(_OPAQUE_UNIT)

@@ -184,7 +184,7 @@ def fill(
 
     With a linear ceiling it is what ``trimmed`` converges to. With a human one mostly, too;
     but the loop cuts by ceilings of curves that are not the last one, and gives nothing back,
-    so that smooth histograms may differ by up to 0.1 in ln units.
+    so that smooth histograms may differ by up to 0.14 in ln units.
 
     Its slope (ln by ln) is min(lambda x count, ceiling) in each bin, lambda such that the display
     from ``low`` to ``high`` cd/m2 is filled. The ceiling is the contrast just seen on the

@@ -87,9 +87,15 @@ class Emitters:
         """
         materials: dict[Material, int] = {}
         places: dict[tuple[int, int, bool], list[Doubles]] = {}
+        alone: dict[tuple[bool, TextureUse | None], list[Rows]] = {}
+        for some, texture, moving in self._shown:
+            alone.setdefault((moving, texture), []).append(some)
         # Still ones first: what moving ones add does not renumber their materials.
-        for rows, texture, moving in sorted(self._shown, key=lambda shown: shown[2]):
+        for (moving, texture), together in sorted(alone.items(), key=lambda item: item[0][0]):
+            rows = np.concatenate(together)
             rows = rows[_seen(rows)]
+            if not len(rows):
+                continue
             alike = np.column_stack([rows["shape"], rows["sp"], _luminance(rows, profiles)])
             kinds, which = np.unique(alike, axis=0, return_inverse=True)
             at = _places(rows)

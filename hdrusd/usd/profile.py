@@ -35,7 +35,7 @@ from hdrusd.photometry.profile import MOST_CELLS, cell_count, even_profile
 from hdrusd.report import Kind, Report
 from hdrusd.scene import Profile
 from hdrusd.usd.assets import asset_bytes, resolved_asset
-from hdrusd.usd.findings import place_of, prim_finding
+from hdrusd.usd.findings import prim_finding
 from hdrusd.usd.lux import input_number, input_source
 
 _FILE = "shaping:ies:file"
@@ -54,7 +54,6 @@ class Profiles:
 
     def __init__(self, stage: Usd.Stage, report: Report) -> None:
         self.report = report
-        self._place = place_of(stage)
         self._files: dict[str, _File | None] = {}
         self._numbers: dict[tuple[str, float], int] = {}
         self._cells = 0

@@ -9,12 +9,13 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import OpenImageIO
 import street_pictures as pictures
 import street_surfaces as surfaces
 from eye_stage import EyeStage, Finish
 from street_model import Array, Material, Mesh, Node, Vec3
 from street_shapes import Kit, Shape
+
+from hdrusd.images import write_exr, write_png
 
 STREET = Path(__file__).resolve().parents[1] / "street"
 
@@ -23,16 +24,12 @@ GRAIN = 0.5
 
 
 def write_picture(path: Path, values: Array) -> None:
-    """(h, w) or (h, w, 3), top row first: 8 bits of 0 to 1, floats as EXR. Raises OSError."""
-    pixels = np.asarray(values, np.float32)
-    if path.suffix == ".png":
-        pixels = (np.clip(values, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
-    if pixels.ndim == 2:
-        pixels = pixels[..., None]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    image = OpenImageIO.ImageBuf(np.ascontiguousarray(pixels))
-    if not image.write(str(path)):
-        raise OSError(f"{path}: {image.geterror()}")
+    """(h, w) or (h, w, 3) between 0 and 1, top row first: PNG in 8 bits, EXR in floats."""
+    pixels = values if values.ndim == 3 else np.repeat(values[..., None], 3, axis=2)
+    if path.suffix == ".exr":
+        write_exr(path, pixels, luminance=False)
+    else:
+        write_png(path, (np.clip(pixels, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8))
 
 
 def grain() -> Array:

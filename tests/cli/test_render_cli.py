@@ -195,6 +195,9 @@ def test_half_and_petit2010(hdrusd: CommandLine, tmp_path: Path) -> None:
         (["{stage}", "/proc/a.png"], 1, "/proc/a.png: cannot be written"),
         (["{stage}", "/dev/null/a.exr"], 1, "/dev/null"),
         (["{stage}", "a.exr", "--report", "."], 2, "is a directory"),
+        (["{stage}", "a.exr", "--report", "/proc/none/r.json"], 1, "/proc/none/r.json: nothing"),
+        (["{stage}", "a.exr", "--report", "{stage}/r.json"], 1, "street.usda (Not a directory)"),
+        (["{stage}", "a.exr", "--report", "/dev/null"], 1, "/dev/null: not a regular file"),
         (["{stage}", "a.exr", "--frame", "1"], 2, "No such option"),
     ],
 )

@@ -108,14 +108,13 @@ def test_a_lamp_in_the_dark_is_the_kernel_around_it() -> None:
 
 
 def test_reading_the_plane_as_angles_errs_at_the_edge() -> None:
-    """At 27 degrees a pixel is 0.84 as wide: 1 / theta^2 hides it, steeper kernels do not."""
+    """At 27 degrees a pixel is 0.84 as wide; 1 / theta^2 hides most of it."""
     size = 61, 31
     field = fields(60.0, size)
     frame = np.zeros((31, 61, 1))
     frame[15, 57] = 1e5
     flat, true = (f(frame, field, CIE, EYE)[15, 40:50, 0] for f in (painted, seen))
     np.testing.assert_allclose(flat, true, rtol=0.2)
-    assert np.all(flat < true)
 
 
 def test_lamps_by_their_lux() -> None:

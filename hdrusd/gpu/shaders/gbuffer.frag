@@ -24,21 +24,50 @@ const int uv_sets[FETCHES] = UV_SETS;
 vec2 image_place(int k)
 {
     int set = uv_sets[k];
-    vec3 st = vec3(set == 0 ? uv01.xy : set == 1 ? uv01.zw : set == 2 ? uv23.xy : uv23.zw, 1.0);
-    return vec2(dot(image_u[k], st), dot(image_v[k], st));
+    vec2 st = set == 0 ? uv01.xy : set == 1 ? uv01.zw : set == 2 ? uv23.xy : uv23.zw;
+#ifdef PLAIN_PLACES            // the matrices of all are the identity
+    return st;
+#else
+    return vec2(dot(image_u[k], vec3(st, 1.0)), dot(image_v[k], vec3(st, 1.0)));
+#endif
 }
 
 #define texel(k) texture(images[k], image_place(k))  // k must be a constant
 #endif
 
 // -- fields of the material -----------------------------------------------------------------
-uniform vec3 diffuse, diffuse_scale;      // reflectance
+// One that is what it mostly is, 0 or 1, comes as a #define: what a pixel reads of a uniform
+// costs a software device more than what is done with it.
+#ifdef DIFFUSE
+const vec3 diffuse = DIFFUSE;
+#else
+uniform vec3 diffuse;          // reflectance
+#endif
+#ifdef DIFFUSE_SCALE
+const vec3 diffuse_scale = DIFFUSE_SCALE;
+#else
+uniform vec3 diffuse_scale;
+#endif
+#ifdef EMISSION
+const vec3 emission = EMISSION;
+#else
+uniform vec3 emission;         // cd/m2
+#endif
+#ifdef METALLIC
+const float metallic = METALLIC;
+#else
+uniform float metallic;
+#endif
+#ifdef OCCLUSION
+const float occlusion = OCCLUSION;
+#else
+uniform float occlusion;
+#endif
 uniform vec3 specular, specular_scale;    // reflectance at normal incidence
-uniform vec3 emission, emission_scale;    // cd/m2
-uniform float metallic, metallic_scale;
+uniform vec3 emission_scale;
+uniform float metallic_scale, occlusion_scale;
 uniform float opacity, opacity_scale;
 uniform float opacity_threshold;
-uniform float occlusion, occlusion_scale;
 #ifdef GGX
 uniform float roughness, roughness_scale;
 #else
@@ -65,10 +94,14 @@ uniform float lambert_scale;   // 1/pi, or 1 for petit2010
 
 layout(location = 0) out vec4 g_normal;    // unit normal; distance along the view axis, m
 layout(location = 1) out vec4 g_diffuse;   // reflectance; shininess, or minus alpha of GGX
+#ifdef ONE_SPECULAR        // the same of all surfaces: there is no target for it
+layout(location = 2) out vec4 hdr;         // cd/m2; 1, or as composite.frag wants it
+#else
 layout(location = 2) out vec4 g_specular;  // reflectance at normal incidence; metallic
-layout(location = 3) out vec4 hdr;         // cd/m2; 1, or as composite.frag wants it
+layout(location = 3) out vec4 hdr;
+#endif
 #ifdef EXTRA
-layout(location = 4) out vec4 g_extra;     // clear coat: weight, alpha; light links; 0
+layout(location = EXTRA) out vec4 g_extra; // clear coat: weight, alpha; light links; 0
 #endif
 
 #ifdef SKY_APART
@@ -120,7 +153,7 @@ void main()
 #ifdef SKY_APART
 #elif defined(SKY)
     vec3 lux = ambient_lux(n, sky);
-#else
+#elif !defined(DARK)
     vec3 lux = ambient;
 #endif
     vec3 rho = base * (1.0 - metal);
@@ -139,7 +172,7 @@ void main()
     vec3 glow = max(emission EMISSION_MAP, 0.0);
 #ifdef SKY_APART
     g_scattered = vec4(scattered, 0.0);
-#else
+#elif !defined(DARK)       // no light but lamps
     glow += lambert(scattered, lux, lambert_scale);
 #endif
 #ifdef GGX
@@ -178,7 +211,9 @@ void main()
 #endif
     g_normal = vec4(n, depth);
     g_diffuse = vec4(rho, gloss);
+#ifndef ONE_SPECULAR
     g_specular = vec4(f0, metal);
+#endif
     hdr = vec4(glow, shown);
 #ifdef EXTRA
     float smooth_coat = clamp(clearcoat_roughness CLEARCOAT_ROUGHNESS_MAP, 0.0, 1.0);

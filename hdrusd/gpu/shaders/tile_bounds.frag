@@ -20,9 +20,11 @@ void main()
             bool seen = z > 0.0;
             depth = seen ? vec2(min(depth.x, z), max(depth.y, z)) : depth;
 #ifdef GLOSSY
-            vec3 ks = texelFetch(g_specular, at, 0).rgb;
             float code = texelFetch(g_diffuse, at, 0).w;
+#ifndef DIELECTRIC  // then all of them shine
+            vec3 ks = texelFetch(g_specular, at, 0).rgb;
             seen = seen && max(ks.r, max(ks.g, ks.b)) > 0.0;
+#endif
             ggx = ggx || (seen && code < 0.0);
             blinn = blinn || (seen && code >= 0.0);
             // Half the width of the lobe over the half vector, rad: alpha, or sqrt(2 / (n + 2)).
