@@ -39,7 +39,7 @@ def eye_options(function: F) -> F:
         click.option(
             "--cuts",
             metavar="FRAMESPEC",
-            help="Frames that begin a new view.",
+            help="Frames that begin a new view; so does a frame of another camera.",
         ),
         click.option(
             "--cut",

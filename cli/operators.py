@@ -20,6 +20,8 @@ def command(name: str | None) -> None:
     operator = OPERATORS[name]
     click.echo(f"{operator.name}: {operator.title}")
     click.echo(f"  {operator.cite}")
+    if operator.advance is not None:
+        click.echo("  in time: a sequence has a state, which goes on from frame to frame")
     for parameter in operator.parameters:
         unit = f" {parameter.unit}" if parameter.unit else ""
         default = "none" if parameter.default is None else parameter.default

@@ -40,6 +40,9 @@ _QUANTITIES = {
 #: M. Okabe, K. Ito, "Color Universal Design", 2008: told apart by colour-blind readers too.
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
+#: Thresholds are broken lines, so that they are not taken for what is seen.
+_DASHES = ((0, (4, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)))
+
 _STYLE = {
     "font.family": "DejaVu Sans",  # comes with matplotlib
     "font.size": 9.0,
@@ -50,7 +53,6 @@ _STYLE = {
     "axes.grid": True,
     "grid.color": "#d8d8d8",
     "grid.linewidth": 0.5,
-    "lines.linewidth": 1.6,
     "legend.frameon": False,
     "savefig.dpi": 150,
 }
@@ -160,12 +162,25 @@ class AdaptationLog:
         if decades:
             panel.set_yscale("log")
             series = [np.where(np.nan_to_num(y) > 0.0, y, np.nan) for y in series]
-        for index, (column, y) in enumerate(zip(columns, series, strict=True)):
+        marker = "o" if len(time) == 1 else ""
+        widths = np.linspace(2.4, 1.2, len(columns))  # of lines that coincide all are seen
+        drawn = {True: 0, False: 0}
+        for column, y, width in zip(columns, series, widths, strict=True):
             name = split(column)[0]
-            line = "--" if "threshold" in name else "-" if index < len(_COLOURS) else "-."
-            marker = "o" if len(time) == 1 else ""
-            colour = _COLOURS[index % len(_COLOURS)]
-            panel.plot(time, y, label=name, color=colour, linestyle=line, marker=marker)
+            broken = "threshold" in name
+            count = drawn[broken]
+            drawn[broken] += 1
+            colours = _COLOURS[::-1] if broken else _COLOURS
+            line = _DASHES[count % len(_DASHES)] if broken else "-"
+            panel.plot(
+                time,
+                y,
+                label=name,
+                color=colours[count % len(colours)],
+                linestyle=line,
+                linewidth=width,
+                marker=marker,
+            )
         panel.set_ylabel(label)
         panel.margins(x=0.0 if len(time) > 1 else 0.05)
         panel.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)

@@ -17,6 +17,7 @@ from hdrusd.by_products import ByProducts
 from hdrusd.course import Checkpoints, Course, Cut, Start
 from hdrusd.errors import SourceRef
 from hdrusd.gpu.context import create_context
+from hdrusd.gpu.ldr import deep
 from hdrusd.gpu.program import Programs
 from hdrusd.images import REC709, read_exr_header, read_exr_layers, write_png
 from hdrusd.report import Kind, Report
@@ -104,6 +105,9 @@ def tonemap_sequence(
         done = [target.is_file() for _, _, target in jobs]
         begin = first_to_see([frame for frame, _, _ in jobs], done, course, states)
     eye: _Eye | None = None
+    camera: Any = None
+    if 0 < begin < len(jobs):
+        camera = read_exr_header(jobs[begin - 1][1]).get("hdrusd:camera")
     clock = _Clock(showing.fps, report if in_time and len(jobs) > 1 else Report())
     with Writer() as writer, _by_products(jobs, showing) as beside:
         try:
@@ -117,6 +121,9 @@ def tonemap_sequence(
                 rgb, header, layers = read_exr_layers(source)
                 _note_units(source, header, report)
                 time = clock.time(frame, source, header)
+                if camera not in (None, header.get("hdrusd:camera")):
+                    course.cuts |= {frame}
+                camera = header.get("hdrusd:camera")
                 angles = field_of(header, rgb.shape[1], rgb.shape[0], showing.across)
                 rods = layers.get("scotopic.Y") if showing.viewing.night_colour else None
                 pixels = rgb if rods is None else with_rods(rgb, rods)
@@ -126,7 +133,7 @@ def tonemap_sequence(
                     states.keep(frame, time, moment.state)
                 beside.add(frame, time, moment, shown.picture if shown else None, target)
                 if shown is not None:
-                    writer.submit(write_png, target, shown.picture)
+                    writer.submit(write_png, target, shown.picture, pq=deep(shown.moment.screen))
                 yield Seen(frame, target, time, moment, shown)
         finally:
             if states is not None:

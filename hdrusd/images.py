@@ -44,6 +44,9 @@ _COMPRESSIONS: dict[str, Any] = {
     "none": OpenEXR.NO_COMPRESSION,
 }
 
+#: Rec. 2020 primaries, PQ, no matrix, full range (ITU-T H.273).
+_PQ = (9, 16, 0, 1)
+
 #: The largest finite half float.
 HALF_MAX = 65504.0
 
@@ -224,15 +227,21 @@ def read_exr_header(path: Path) -> dict[str, Any]:
         raise InputError(path, f"not a readable EXR ({_first_line(str(problem))})") from problem
 
 
-def write_png(path: Path, pixels: npt.NDArray[Any], comment: str = "") -> None:
-    """Write code values, (h, w, 1 to 4) uint8 or uint16, top row first, alpha apart."""
+def write_png(path: Path, pixels: npt.NDArray[Any], comment: str = "", *, pq: bool = False) -> None:
+    """Write code values, (h, w, 1 to 4) uint8 or uint16, top row first, alpha apart.
+
+    sRGB, or with ``pq`` Rec. 2020 by SMPTE ST 2084, which the chunk cICP then says.
+    """
     h, w, channels = pixels.shape
 
     def write(temporary: Path) -> None:
         spec = oiio.ImageSpec(
             w, h, channels, oiio.UINT16 if pixels.dtype == np.uint16 else oiio.UINT8
         )
-        spec.attribute("oiio:ColorSpace", "sRGB")
+        if pq:
+            spec.attribute("CICP", "int[4]", _PQ)
+        else:
+            spec.attribute("oiio:ColorSpace", "sRGB")
         spec.attribute("oiio:UnassociatedAlpha", 1)  # else colours are divided by alpha
         spec.attribute("png:compressionLevel", 4)
         if comment:

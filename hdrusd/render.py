@@ -22,6 +22,7 @@ from hdrusd.eye.scotopic import scotopic
 from hdrusd.eye.screen import Screen
 from hdrusd.frames import frame_path
 from hdrusd.gpu.hdr import HdrRenderer, Options
+from hdrusd.gpu.ldr import deep
 from hdrusd.gpu.program import Programs
 from hdrusd.images import half_clipped, write_exr, write_png
 from hdrusd.job import Job
@@ -361,7 +362,9 @@ def _write(renderer: Renderer, frame: Frame, writer: Writer) -> None:
             layers=frame.layers,
         )
     if job.png is not None and frame.ldr is not None:
-        writer.submit(write_png, frame_path(job.png, frame.time), frame.ldr)
+        path = frame_path(job.png, frame.time)
+        pq = frame.moment is not None and deep(frame.moment.screen)
+        writer.submit(write_png, path, frame.ldr, pq=pq)
 
 
 def field_of_view(camera: Camera) -> tuple[float, float] | None:

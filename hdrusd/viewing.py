@@ -93,7 +93,7 @@ class Sight:
     ``time`` in s, ``frame`` its number; ``field``: width and height in degrees, None where the
     camera is unknown; ``parameters`` of the operator where they are this frame's own.
     ``lamps`` (n, 6) are outside the frame and dazzle all the same (glare/veil.py). ``rods``: the
-    frame's fourth channel is what scotopic luminance is times that of its RGB (decision 19).
+    frame's fourth channel is what corrects the scotopic luminance of its RGB (``with_rods``).
     """
 
     time: float = 0.0

@@ -1,6 +1,17 @@
 """The veil of glare on the GPU; what it draws is defined in glare/pyramid.py.
 
-Every level is an RGBA32F texture: half floats end at 65504, and lamps are brighter.
+Every level is an RGBA32F texture: half floats end at 65504, R11F_G11F_B10F too, and lamps are
+brighter. Processor time on llvmpipe (two 2.5 GHz cores share it), ms, least of twelve, for 60
+degrees:
+
+    picture        levels  matrix  blur and add  compose  in all
+    1280 x 720       22       2         31          20       80
+    1920 x 1080      50       3         55          43      160
+    3840 x 2160     168       5         56         153      390
+
+and 0.1 ms for each lamp beside the picture. "compose" reads the frame and writes another one,
+which alone takes 33 ms at 1920 x 1080; "levels" is mostly the first one, 16 texels of the frame
+for each of its own. The matrix is on the CPU, behind a read of some 2,500 texels.
 """
 
 from __future__ import annotations

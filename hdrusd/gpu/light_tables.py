@@ -168,14 +168,24 @@ def _kinds(lights: Lights, extras: Extras | None) -> npt.NDArray[np.str_]:
     local = lights["w"] > 0.0
     focus = (lights["exponent"] > 0.0) & local
     cone = (lights["outer"] < NO_CONE) & local
-    shape = shines_as(lights)
-    plain = (shape == POINT) & (lights["diffuse"] == 1.0) & (lights["specular"] == 1.0)
+    plain = (shines_as(lights) == POINT) & (lights["diffuse"] == 1.0) & (lights["specular"] == 1.0)
     plain &= (lights["link"] == 0) & ~((lights["angle"] > 0.0) & ~local)
     if extras is not None:
         plain &= (extras.shadow_kind == "") & (extras.profile_kind == "")
-    simple = np.where(focus, "FOCUS", np.where(cone, "CONES", "PLAIN"))
+    kinds = np.where(focus, "FOCUS", np.where(cone, "CONES", "PLAIN")).astype("U200")
+    others = np.flatnonzero(~plain)
+    if len(others):
+        kinds[others] = _words(lights[others], None if extras is None else extras.of(others))
+    return kinds
+
+
+def _words(lights: Lights, extras: Extras | None) -> npt.NDArray[np.str_]:
+    """(n,) the #defines of lights that are not simple."""
+    local = lights["w"] > 0.0
+    beam = ((lights["exponent"] > 0.0) | (lights["outer"] < NO_CONE)) & local
+    shape = shines_as(lights)
     words = np.full(len(lights), "SPECIAL", dtype="U200")
-    words = np.where(focus | cone, np.char.add(words, " BEAM"), words)
+    words = np.where(beam, np.char.add(words, " BEAM"), words)
     for number, name in _SHAPES.items():
         words = np.where(shape == number, np.char.add(words, f" {name}"), words)
     words = np.where(~local & (lights["angle"] > 0.0), np.char.add(words, " DISTANT"), words)
@@ -187,7 +197,7 @@ def _kinds(lights: Lights, extras: Extras | None) -> npt.NDArray[np.str_]:
             (extras.shadow_kind, shadow),
         ):
             words = np.where(kind != "", np.char.add(np.char.add(words, " "), text), words)
-    return np.asarray(np.where(plain, simple, words))
+    return words
 
 
 def _texels(lights: Lights, camera: Camera, kind: str) -> npt.NDArray[np.float64]:

@@ -29,6 +29,7 @@ from hdrusd.scene import (
     Profile,
     TextureUse,
 )
+from hdrusd.usd.instanced_lights import joined
 from hdrusd.usd.light_bounds import seen_area
 
 Rows = npt.NDArray[np.void]
@@ -87,12 +88,12 @@ class Emitters:
         """
         materials: dict[Material, int] = {}
         places: dict[tuple[int, int, bool], list[Doubles]] = {}
-        alone: dict[tuple[bool, TextureUse | None], list[Rows]] = {}
+        alike_drawn: dict[tuple[bool, TextureUse | None], list[Rows]] = {}
         for some, texture, moving in self._shown:
-            alone.setdefault((moving, texture), []).append(some)
+            alike_drawn.setdefault((moving, texture), []).append(some)
         # Still ones first: what moving ones add does not renumber their materials.
-        for (moving, texture), together in sorted(alone.items(), key=lambda item: item[0][0]):
-            rows = np.concatenate(together)
+        for (moving, texture), together in sorted(alike_drawn.items(), key=_moves):
+            rows = joined(together)
             rows = rows[_seen(rows)]
             if not len(rows):
                 continue
@@ -138,6 +139,10 @@ def beamed_balls(rows: Rows) -> npt.NDArray[np.bool_]:
     """(n,) which lamps shine, have a size, and are not seen: balls with a beam."""
     beam = (rows["outer"] < NO_CONE) | (rows["exponent"] > 0.0) | (rows["profile"] >= 0)
     return np.asarray((rows["shape"] == SPHERE) & beam & _shining(rows))
+
+
+def _moves(item: tuple[tuple[bool, TextureUse | None], list[Rows]]) -> bool:
+    return item[0][0]
 
 
 def _seen(rows: Rows) -> npt.NDArray[np.bool_]:

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from command_line import CommandLine
 
-from hdrusd.images import read_exr_header, read_image, write_exr
+from hdrusd.images import read_exr, read_exr_header, read_image, write_exr
 
 FRAMES = 60
 
@@ -153,6 +153,27 @@ def test_a_cut(hdrusd: CommandLine, night: str, tmp_path: Path) -> None:
     )
     assert cut == own
     assert kept != own
+
+
+def test_another_camera_is_a_cut(hdrusd: CommandLine, night: str, tmp_path: Path) -> None:
+    """Also for a run that is resumed just there."""
+    for number, name in ((1, "front"), (2, "front"), (3, "rear"), (4, "rear")):
+        rgb, header = read_exr(Path(night.replace("####", f"{number * 12:04}")))
+        entries = {"hdrusd:frame": float(number), "hdrusd:camera": name}
+        write_exr(tmp_path / f"n.{number}.exr", rgb, entries)
+        assert header["hdrusd:frame"] == number * 12
+    to = ["tonemap", tmp_path / "n.#.exr", tmp_path / "p.#.png", "-op", "irawan05"]
+    options = ["--adapt-from", "1000", "--cut", "reset", "--fps", "24"]
+    hdrusd.run(*to, *options, "-f", "1:4")
+    wanted = (tmp_path / "p.3.png").read_bytes()
+    hdrusd.run("tonemap", tmp_path / "n.3.exr", tmp_path / "own.png", "-op", "irawan05")
+    assert wanted == (tmp_path / "own.png").read_bytes()
+    (tmp_path / "p.eye.json").unlink()
+    for number in (3, 4):
+        (tmp_path / f"p.{number}.png").unlink()
+    hdrusd.run(*to, *options, "-f", "1:2")
+    hdrusd.run(*to, *options, "-f", "1:4", "--resume")
+    assert wanted == (tmp_path / "p.3.png").read_bytes()
 
 
 def test_numbers_of_the_eye(hdrusd: CommandLine, night: str, tmp_path: Path) -> None:
