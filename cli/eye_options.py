@@ -180,3 +180,13 @@ def night_vision(options: dict[str, Any]) -> dict[str, bool]:
     """--night-vision as what Viewing and Job call its parts."""
     chosen = options["night_vision"]
     return {"acuity": chosen in ("acuity", "all"), "night_colour": chosen in ("colour", "all")}
+
+
+def flicker_of(log: Path | None) -> dict[str, float]:
+    """What a sequence in time says of its steadiness, for --json and --report."""
+    from hdrusd.adaptation_log import AdaptationLog
+    from hdrusd.by_products import flicker
+
+    if log is None or not log.is_file():
+        return {}
+    return {"flicker": round(flicker(AdaptationLog.read_csv(log)), 6)}

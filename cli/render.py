@@ -21,6 +21,7 @@ from .eye_options import (
     chosen_screen,
     chosen_start,
     eye_options,
+    flicker_of,
     night_vision,
     plot_file,
 )
@@ -211,6 +212,7 @@ def command(stage: Path, output: str, **options: Any) -> None:
         "skipped": skipped,
         "seconds": round(time.perf_counter() - started, 3),
     }
+    document |= flicker_of(job.log)
     if options["report_file"] is not None:
         write_report(options["report_file"], document)
     tell(report, options["quiet"])

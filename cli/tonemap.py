@@ -21,6 +21,7 @@ from .eye_options import (
     chosen_screen,
     chosen_start,
     eye_options,
+    flicker_of,
     night_vision,
     plot_file,
 )
@@ -104,6 +105,7 @@ def command(source: str, output: str, **options: Any) -> None:
         "frames": len(jobs),
         "skipped": len(jobs) - len(written),
     }
+    document |= flicker_of(showing.log)
     if options["report_file"] is not None:
         write_report(options["report_file"], document)
     tell(report, options["quiet"])

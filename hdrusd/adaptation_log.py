@@ -163,7 +163,7 @@ class AdaptationLog:
             panel.set_yscale("log")
             series = [np.where(np.nan_to_num(y) > 0.0, y, np.nan) for y in series]
         marker = "o" if len(time) == 1 else ""
-        widths = np.linspace(2.4, 1.2, len(columns))  # of lines that coincide all are seen
+        widths = 1.9 - 0.1 * np.arange(len(columns))  # of lines that coincide the lower show
         drawn = {True: 0, False: 0}
         for column, y, width in zip(columns, series, widths, strict=True):
             name = split(column)[0]
@@ -178,7 +178,7 @@ class AdaptationLog:
                 label=name,
                 color=colours[count % len(colours)],
                 linestyle=line,
-                linewidth=width,
+                linewidth=max(width, 1.1),
                 marker=marker,
             )
         panel.set_ylabel(label)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+import math
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -11,9 +11,26 @@ from typing import Any
 import numpy as np
 
 from hdrusd.adaptation_log import AdaptationLog, check_plot
+from hdrusd.colour import luminance
+from hdrusd.eye.screen import Screen
 from hdrusd.images import read_image
 from hdrusd.tonemap.operator import Moment, Operator
 from hdrusd.video import VideoWriter
+from hdrusd.viewing import decoded
+
+#: The column of what the screen shows.
+SCREEN = "mean luminance of the screen [cd/m2]"
+
+
+def flicker(log: AdaptationLog) -> float:
+    """The largest change of the screen's mean luminance from one frame to the next.
+
+    As a share of their mean; 0 where no two neighbours were shown.
+    """
+    shown = [row.get(SCREEN, math.nan) for _, row in log.in_order()]
+    before, after = np.array(shown[:-1]), np.array(shown[1:])
+    change = np.abs(after - before) / (0.5 * (after + before))
+    return float(np.nanmax(change)) if np.isfinite(change).any() else 0.0
 
 
 class ByProducts:
@@ -69,15 +86,20 @@ class ByProducts:
         self, frame: float, time: float, moment: Moment | None, picture: Any, file: Path | None
     ) -> None:
         """The next frame; ``picture`` None: as it is in ``file`` already."""
-        if moment is not None:
-            self.log.add(frame, time, self._numbers(moment))
-        if self._video is not None and (picture is not None or file is not None):
-            pixels = (
-                picture if file is None or picture is not None else read_image(file).pixels[..., :3]
-            )
-            self._video.add(eight_bits(pixels))
 
-    def _numbers(self, moment: Moment) -> Mapping[str, float]:
+        def pixels() -> Any:
+            there = picture is None and file is not None
+            return read_image(file).pixels[..., :3] if there else picture  # type: ignore[arg-type]
+
+        if moment is not None:
+            numbers = self._numbers(moment)
+            if self.csv is not None:
+                numbers[SCREEN] = screen_luminance(pixels(), moment.screen)
+            self.log.add(frame, time, numbers)
+        if self._video is not None and (picture is not None or file is not None):
+            self._video.add(eight_bits(pixels()))
+
+    def _numbers(self, moment: Moment) -> dict[str, float]:
         numbers: dict[str, float] = {}
         stats = moment.statistics
         if stats is not None:
@@ -86,6 +108,15 @@ class ByProducts:
         if self.operator is not None and self.operator.trace is not None:
             numbers |= self.operator.trace(moment)
         return numbers
+
+
+def screen_luminance(picture: Any, screen: Screen) -> float:
+    """Mean luminance, cd/m2, that ``screen`` shows of code values (h, w, 3), reflections too."""
+    codes = eight_bits(picture)
+    levels = decoded(np.arange(256) / 255.0, screen)
+    by_channel = [levels @ np.bincount(codes[..., i].ravel(), minlength=256) for i in range(3)]
+    share = 3.0 * float(luminance(np.array(by_channel))) / codes.size
+    return float(screen.black_level + share * (screen.white_level - screen.black_level))
 
 
 def eight_bits(picture: Any) -> Any:

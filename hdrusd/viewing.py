@@ -20,12 +20,16 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.colour import (
+    bt1886_decode,
     bt1886_encode,
     clean,
     dither,
+    gamma_decode,
     gamma_encode,
+    pq_decode,
     pq_encode,
     quantise,
+    srgb_decode,
     srgb_encode,
     to_rec2020,
 )
@@ -277,6 +281,17 @@ def _encoded(linear: Array, screen: Screen) -> Array:
         emitted = screen.black + linear * (screen.peak - screen.black)
         return pq_encode(np.maximum(to_rec2020(emitted), 0.0))
     return srgb_encode(linear)
+
+
+def decoded(code: Array, screen: Screen) -> Array:
+    """Grey code values [0, 1] as display-linear light: by the EOTF, what ``encode`` did."""
+    if screen.eotf == "gamma22":
+        return gamma_decode(code, 2.2)
+    if screen.eotf == "bt1886":
+        return bt1886_decode(code, screen.black, screen.peak)
+    if screen.eotf == "pq":
+        return np.clip((pq_decode(code) - screen.black) / (screen.peak - screen.black), 0.0, 1.0)
+    return srgb_decode(code)
 
 
 def add_legend(picture: Array, operator: Operator, moment: Moment) -> None:

@@ -182,7 +182,10 @@ class HdrRenderer:
 
     def read(self) -> npt.NDArray[np.float32]:
         """The frame as (h, w, 3) float32 in cd/m2, top row first."""
-        return np.ascontiguousarray(self._read(self.hdr)[..., :3])
+        w, h = self.size
+        frame = self._frame if self._sum is None else self._sum.frame
+        pixels = np.frombuffer(frame.read(components=3, dtype="f4"), np.float32)
+        return np.ascontiguousarray(pixels.reshape(h, w, 3)[::-1])
 
     def layer(self, name: str) -> npt.NDArray[np.float32]:
         """A layer of the G-buffer (``LAYERS``; gbuffer.frag) as (h, w, 4), top row first.

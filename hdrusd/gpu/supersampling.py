@@ -51,20 +51,20 @@ class Accumulator:
         self.programs = programs
         self.texture = ctx.texture(size, 4, dtype="f4")
         self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._frame = ctx.framebuffer([self.texture])
+        self.frame = ctx.framebuffer([self.texture])
 
     def release(self) -> None:
         """Give its memory back."""
-        release(self._frame, self.texture)
+        release(self.frame, self.texture)
 
     def clear(self) -> None:
         """Begin anew."""
-        self._frame.clear()
+        self.frame.clear()
 
     def add(self, frame: moderngl.Texture, weight: float) -> None:
         """Add ``weight`` times a frame of the same size."""
         vao = self.programs.fullscreen("gpu/shaders/accumulate.frag")
         frame.use(0)
         vao.program["frame"], vao.program["weight"] = 0, weight
-        with blending(self.ctx, self._frame):
+        with blending(self.ctx, self.frame):
             vao.render(moderngl.TRIANGLES, vertices=3)
