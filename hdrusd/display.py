@@ -153,7 +153,8 @@ def _by_products(jobs: Sequence[tuple[float, Path, Path]], showing: Showing) -> 
         plot=showing.plot,
         video=showing.video,
         fps=fps or DEFAULT_FPS,
-        resume=showing.resume,
+        # The other part of a split sequence has its lines there too.
+        resume=showing.resume or showing.start.state is not None,
     )
 
 

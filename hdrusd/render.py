@@ -317,7 +317,7 @@ def _by_products(renderer: Renderer) -> ByProducts:
         plot=job.plot,
         video=job.video,
         fps=renderer.stage.GetTimeCodesPerSecond(),
-        resume=job.resume,
+        resume=job.resume or job.start.state is not None,
     )
 
 

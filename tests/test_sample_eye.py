@@ -264,6 +264,30 @@ def test_illuminance_of_the_road_from_both_own_lamps(made: Path, beam: Luminaire
     assert 0.5 < lux < 3.0
 
 
+def test_rendered_road_before_the_own_car(gl: Any, made: Path, beam: Luminaire) -> None:
+    """L = R I cos / (pi d^2) of both lamps and the ambient light, over 5 to 20 m of the lane."""
+    job = Job(made / "oncoming.usda", times=[0.0], width=320, height=180)
+    (frame,) = render_sequence(gl, job, Report())
+    found = np.asarray(frame.hdr, np.float64)[..., :3] @ (0.2126, 0.7152, 0.0722)
+    eye, scale = np.array((1.38, 0.10, 1.30)), 160.0 / math.tan(math.radians(25.0))
+    x, y = (v.ravel() for v in np.meshgrid(np.linspace(0.6, 3.0, 25), np.linspace(5.0, 20.0, 61)))
+    column = 160.0 + scale * (x - eye[0]) / (y - eye[1])
+    row = 90.0 + scale * eye[2] / (y - eye[1])
+    lux = np.full(x.shape, ambient(opened(made, "oncoming")))
+    for lamp in (1.75 - 0.55, 1.75 + 0.55):
+        # In the beam's own frame, which is turned down by AIM about the lamp.
+        to = np.stack((x - lamp, y - 2.005, np.full(x.shape, -0.64)))
+        sine, cosine = math.sin(math.radians(AIM)), math.cos(math.radians(AIM))
+        ahead, up = cosine * to[1] + sine * to[2], cosine * to[2] - sine * to[1]
+        across = np.degrees(np.arctan2(to[0], ahead))
+        angle = np.degrees(np.arctan2(up, np.hypot(to[0], ahead)))
+        lux += beam.value(across, angle) * 0.64 / (to**2).sum(axis=0) ** 1.5
+    inside = (column < 319) & (row < 179)
+    rendered = found[row[inside].astype(int), column[inside].astype(int)].mean()
+    # 5 %: grain.
+    assert rendered == pytest.approx(0.08 / math.pi * lux[inside].mean(), rel=0.05)
+
+
 # -- lit room ---------------------------------------------------------------------------------
 
 

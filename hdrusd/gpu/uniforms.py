@@ -30,9 +30,13 @@ class Uniforms:
         self._values: dict[str, bytes] = {}
 
     def write(self, values: UniformBytes) -> None:
-        """Set uniforms; one that the compiler found unused and removed is passed over."""
+        """Set uniforms; what the compiler found unused and removed is passed over.
+
+        That may be a uniform, or the end of an array.
+        """
         known = self._values
         for name, value in values.items():
             if known.get(name) != value and name in self._members:
-                self._members[name].write(value)
+                member = self._members[name]
+                member.write(value[: 4 * member.dimension * member.array_length])
                 known[name] = value

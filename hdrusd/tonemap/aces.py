@@ -14,7 +14,9 @@ from hdrusd.errors import ParameterError
 from hdrusd.tonemap.exposure import (
     EXPOSURE_PARAMETERS,
     exposed,
+    exposure_advance,
     exposure_needs,
+    exposure_trace,
     exposure_uniforms,
 )
 from hdrusd.tonemap.operator import Array, Moment, Operator, Parameter, Uniforms
@@ -70,4 +72,6 @@ OPERATOR = Operator(
     function="aces",
     uniforms=_uniforms,
     needs=exposure_needs,
+    advance=exposure_advance,
+    trace=exposure_trace,
 )

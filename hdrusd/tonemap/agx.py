@@ -14,7 +14,9 @@ from hdrusd.colour import from_rec2020, to_rec2020
 from hdrusd.tonemap.exposure import (
     EXPOSURE_PARAMETERS,
     exposed,
+    exposure_advance,
     exposure_needs,
+    exposure_trace,
     exposure_uniforms,
 )
 from hdrusd.tonemap.operator import Array, Moment, Operator, Uniforms
@@ -80,4 +82,6 @@ OPERATOR = Operator(
     function="agx",
     uniforms=_uniforms,
     needs=exposure_needs,
+    advance=exposure_advance,
+    trace=exposure_trace,
 )

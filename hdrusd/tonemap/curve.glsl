@@ -1,22 +1,20 @@
 // One curve from ln scene luminance to ln display luminance; twin of tonemap/curve.py
 #include "colour.glsl"
 
-uniform sampler2D curve_steps;  // n x 1: ln cd/m2 on the display where a step begins, and its rise
-uniform vec2 curve_from;        // ln cd/m2 of the scene where the first begins and the last ends
-uniform vec2 curve_to;          // cd/m2 of the display's black and white
+// n x 1, log2 in units of white - black: display luminance where a step begins, and its rise
+uniform sampler2D curve_steps;
+uniform vec2 curve_place;  // factor and summand that make a step's number of log2 cd/m2
+uniform vec2 curve_to;     // log2 of white, and black, in those units
+uniform float curve_last;  // number of the last step
 
 // Display-relative value in [0, 1] for a scene luminance in cd/m2.
 float curve_value(float y)
 {
-    float b = log(max(y, 1e-30));
-    float inside = clamp(b, curve_from.x, curve_from.y);
-    float count = float(textureSize(curve_steps, 0).x);
-    float place = (inside - curve_from.x) * (count / (curve_from.y - curve_from.x));
-    float first = min(floor(place), count - 1.0);
-    vec2 at = texelFetch(curve_steps, ivec2(int(first), 0), 0).xy;
-    float shown = at.x + (place - first) * at.y + (b - inside);
-    shown = exp(min(shown, log(curve_to.y)));
-    return clamp((shown - curve_to.x) / (curve_to.y - curve_to.x), 0.0, 1.0);
+    float place = log2(max(y, 1e-30)) * curve_place.x + curve_place.y;
+    int at = int(clamp(place, 0.0, curve_last));
+    vec2 from = texelFetch(curve_steps, ivec2(at, 0), 0).xy;
+    float shown = min(from.x + (place - float(at)) * from.y, curve_to.x);
+    return clamp(exp2(shown) - curve_to.y, 0.0, 1.0);
 }
 
 // cd/m2 to display-linear [0, 1].

@@ -26,6 +26,8 @@ DEEPEST = 1e-4
 #: cd/m2 that stand for 0 where a logarithm is taken.
 LEAST = 1e-30
 
+LN2 = math.log(2.0)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Curve:
@@ -50,12 +52,24 @@ class Curve:
         return limited
 
     def uniforms(self) -> dict[str, Any]:
-        """What ``curve`` and its twin read: start and rise of each step, and the ranges."""
-        pairs = np.stack([self.log_display[:-1], np.diff(self.log_display)], axis=-1)
+        """What ``curve`` and its twin read.
+
+        ``curve_steps`` (1, n + 2, 2): log2 display luminance where a step begins, in units of
+        white - black, and its rise; before the first step and after the last one more, each in
+        proportion to the scene. ``curve_place``: what makes the number of a step of a log2
+        luminance, factor and summand. ``curve_to``: log2 of white, and black, in the same units.
+        ``curve_last``: number of the last step.
+        """
+        n = self.log_display.size - 1
+        width, range_ = (self.bmax - self.bmin) / n, self.white - self.black
+        ends = self.log_display[0] - width, self.log_display[-1] + width
+        edges = (np.concatenate([ends[:1], self.log_display, ends[1:]]) - math.log(range_)) / LN2
+        pairs = np.stack([edges[:-1], np.diff(edges)], axis=-1)
         return {
             "curve_steps": pairs[None].astype(np.float32),
-            "curve_from": (self.bmin, self.bmax),
-            "curve_to": (self.black, self.white),
+            "curve_place": (LN2 / width, 1.0 - self.bmin / width),
+            "curve_to": (math.log2(self.white / range_), self.black / range_),
+            "curve_last": n + 1.0,
         }
 
 
@@ -77,16 +91,13 @@ def proportional(scale: float, white: float, black: float = 0.0) -> Curve:
 def curve_value(y: npt.ArrayLike, uniforms: Mapping[str, Any]) -> Array:
     """Display-relative value in [0, 1] for a scene luminance in cd/m2, any shape."""
     steps = np.asarray(uniforms["curve_steps"], np.float64)[0]
-    bmin, bmax = uniforms["curve_from"]
-    black, white = uniforms["curve_to"]
-    b = np.log(np.maximum(np.asarray(y, np.float64), LEAST))
-    inside = np.clip(b, bmin, bmax)
-    place = (inside - bmin) * (len(steps) / (bmax - bmin))
-    step = np.minimum(place.astype(np.intp), len(steps) - 1)
-    shown = steps[step, 0] + (place - step) * steps[step, 1] + (b - inside)
+    factor, summand = uniforms["curve_place"]
+    top, black = uniforms["curve_to"]
+    place = np.log2(np.maximum(np.asarray(y, np.float64), LEAST)) * factor + summand
+    step = np.clip(place, 0, len(steps) - 1).astype(np.intp)
+    shown = steps[step, 0] + (place - step) * steps[step, 1]
     # Cut before the exponential, which the sun would overflow in float32.
-    shown = np.exp(np.minimum(shown, math.log(white)))
-    value: Array = np.clip((shown - black) / (white - black), 0.0, 1.0)
+    value: Array = np.clip(np.exp2(np.minimum(shown, top)) - black, 0.0, 1.0)
     return value
 
 

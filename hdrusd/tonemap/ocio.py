@@ -20,7 +20,9 @@ from hdrusd.errors import HdrusdError, ParameterError, UnknownNameError, one_lin
 from hdrusd.tonemap.exposure import (
     EXPOSURE_PARAMETERS,
     exposed,
+    exposure_advance,
     exposure_needs,
+    exposure_trace,
     exposure_uniforms,
 )
 from hdrusd.tonemap.operator import (
@@ -232,6 +234,8 @@ OPERATOR = Operator(
     function="ocio",
     uniforms=_uniforms,
     needs=exposure_needs,
+    advance=exposure_advance,
+    trace=exposure_trace,
     build=_build,
     encoded=True,
     tone_curve=False,  # a view may be anything; some of ACES 2.0 darken very bright pure colours

@@ -12,7 +12,9 @@ import numpy.typing as npt
 from hdrusd.tonemap.exposure import (
     EXPOSURE_PARAMETERS,
     exposed,
+    exposure_advance,
     exposure_needs,
+    exposure_trace,
     exposure_uniforms,
 )
 from hdrusd.tonemap.operator import Array, Moment, Operator, Uniforms
@@ -58,4 +60,6 @@ OPERATOR = Operator(
     function="pbr_neutral",
     uniforms=_uniforms,
     needs=exposure_needs,
+    advance=exposure_advance,
+    trace=exposure_trace,
 )

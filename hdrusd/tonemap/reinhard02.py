@@ -79,7 +79,8 @@ def adapted_average(moment: Moment) -> float:
     return math.exp(remembered("reinhard02", moment.state, "ln_average"))
 
 
-def _trace(moment: Moment) -> Mapping[str, float]:
+def average_trace(moment: Moment) -> Mapping[str, float]:
+    """The log average of a frame, and the one that it is shown by."""
     goal = measured("reinhard02", moment.statistics).log_average
     return {"goal luminance [cd/m2]": goal, "adaptation [cd/m2]": adapted_average(moment)}
 
@@ -131,5 +132,5 @@ OPERATOR = Operator(
     uniforms=_uniforms,
     needs=_needs,
     advance=advance_average,
-    trace=_trace,
+    trace=average_trace,
 )

@@ -22,9 +22,9 @@ from hdrusd.tonemap.operator import (
     Parameter,
     Parameters,
     Uniforms,
-    measured,
     number,
 )
+from hdrusd.tonemap.reinhard02 import adapted_average, advance_average, average_trace
 
 #: Scales, each 1.6 times the one before, beginning with one pixel; the surround of one is the
 #: centre of the next.
@@ -86,13 +86,13 @@ def reinhard02_local(
 
 
 def _uniforms(moment: Moment) -> dict[str, float]:
-    stats, params = measured("reinhard02_local", moment.statistics), moment.parameters
+    params = moment.parameters
     key = number("reinhard02_local", "key", params["key"], 1e-6, 1e6)
     phi = number("reinhard02_local", "phi", params["phi"], 0.0, 32.0)
     white = math.inf if params["white"] is None else params["white"]
     white = number("reinhard02_local", "white", white, 1e-6, math.inf)
     return {
-        "reinhard02_local_scale": key / stats.log_average,
+        "reinhard02_local_scale": key / adapted_average(moment),
         "reinhard02_local_sharpness": math.exp2(phi) * key,
         "reinhard02_local_threshold": number("reinhard02_local", "eps", params["eps"], 0.0, 1.0),
         "reinhard02_local_inverse_white2": white**-2.0,
@@ -133,6 +133,8 @@ OPERATOR = Operator(
     function="reinhard02_local",
     uniforms=_uniforms,
     needs=_needs,
+    advance=advance_average,
+    trace=average_trace,
     blurs=_blurs,
     tone_curve=False,  # of two pixels with different surrounds the brighter may become darker
 )

@@ -81,6 +81,8 @@ def test_a_split_sequence_is_the_whole_one(
     hdrusd.run(*to, "-f", "1:25", "--state-out", split / "a.json")
     hdrusd.run(*to, "-f", "26:60", "--state-in", split / "a.json")
     assert pictures(split) == pictures(whole)
+    tables = [(folder / "p.eye.csv").read_text() for folder in (whole, split)]
+    assert tables[0] == tables[1]
 
 
 def test_killed(night: str, tmp_path: Path, gl: Any, hdrusd: CommandLine) -> None:
