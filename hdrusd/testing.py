@@ -26,6 +26,10 @@ SUN = 1.6e9
 #: 1e-5 of white is a thirtieth of an 8-bit step in black.
 PARITY_RELATIVE, PARITY_ABSOLUTE = 1e-4, 1e-5
 
+#: Code values for a unit of light in black, by sRGB: what PARITY_ABSOLUTE is where an operator's
+#: results are code values.
+_CODES = 12.92
+
 #: Degrees that the frames are wide and high.
 FIELD = (40.0, 25.0)
 
@@ -125,7 +129,8 @@ def _check_parity(
         uniforms=operator.uniforms(moment),
         defines=defines,
     )
-    wrong = ~(np.abs(got - wanted) <= PARITY_RELATIVE * np.abs(wanted) + PARITY_ABSOLUTE)
+    absolute = PARITY_ABSOLUTE * (_CODES if operator.encoded else 1.0)
+    wrong = ~(np.abs(got - wanted) <= PARITY_RELATIVE * np.abs(wanted) + absolute)
     if wrong.any():
         row = int(wrong.any(axis=1).argmax())
         raise AssertionError(

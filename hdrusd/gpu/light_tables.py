@@ -127,7 +127,7 @@ def _with_makes(lights: Lights, kinds: npt.NDArray[np.str_]) -> npt.NDArray[np.s
         if not len(own):
             continue
         lamps = lights[own]
-        colour = lamps["intensity"] / np.max(np.abs(lamps["intensity"]), axis=1, keepdims=True)
+        colour = lamps["intensity"] / _strength(lamps)[:, None]
         same = [np.round(colour, _COLOUR_DECIMALS), lamps["radius"][:, None]]
         if make == "BEAMS":
             same += [lamps["inner"][:, None], lamps["outer"][:, None]]
