@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -108,6 +109,16 @@ class ByProducts:
         if self.operator is not None and self.operator.trace is not None:
             numbers |= self.operator.trace(moment)
         return numbers
+
+
+def playback_rate(fps: float, frames: Sequence[float]) -> float:
+    """Pictures a second so that ``frames`` of which ``fps`` are a second last as long as they do.
+
+    1:240x2 has half of them. Frames at uneven steps play at their mean one.
+    """
+    steps = np.abs(np.diff(np.asarray(frames, np.float64)))
+    step = float(steps.mean()) if steps.size else 1.0
+    return fps / step if step > 0.0 else fps
 
 
 def screen_luminance(picture: Any, screen: Screen) -> float:

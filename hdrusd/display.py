@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hdrusd.by_products import ByProducts
+from hdrusd.by_products import ByProducts, playback_rate
 from hdrusd.course import Checkpoints, Course, Cut, Start
 from hdrusd.errors import SourceRef
 from hdrusd.gpu.context import create_context
@@ -152,7 +152,7 @@ def _by_products(jobs: Sequence[tuple[float, Path, Path]], showing: Showing) -> 
         csv=None if operator.advance is None or showing.stills else showing.log,
         plot=showing.plot,
         video=showing.video,
-        fps=fps or DEFAULT_FPS,
+        fps=playback_rate(fps or DEFAULT_FPS, [frame for frame, _, _ in jobs]),
         # The other part of a split sequence has its lines there too.
         resume=showing.resume or showing.start.state is not None,
     )

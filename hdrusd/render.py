@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from pxr import Tf, UsdGeom
 
-from hdrusd.by_products import ByProducts
+from hdrusd.by_products import ByProducts, playback_rate
 from hdrusd.course import Checkpoints, Course, state_text
 from hdrusd.display import Writer, first_to_see
 from hdrusd.errors import HdrusdError, InputError, SourceRef
@@ -316,7 +316,7 @@ def _by_products(renderer: Renderer) -> ByProducts:
         csv=job.log if in_time else None,
         plot=job.plot,
         video=job.video,
-        fps=renderer.stage.GetTimeCodesPerSecond(),
+        fps=playback_rate(renderer.stage.GetTimeCodesPerSecond(), renderer.times),
         resume=job.resume or job.start.state is not None,
     )
 

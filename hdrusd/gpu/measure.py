@@ -23,7 +23,7 @@ import numpy.typing as npt
 from hdrusd.eye.foveal import default_field
 from hdrusd.gpu.foveal import FovealSampler
 from hdrusd.gpu.program import Programs, set_uniforms
-from hdrusd.tonemap.operator import FLOOR, Need, Statistics, percentile_rank
+from hdrusd.tonemap.operator import FLOOR, Need, Statistics, of_foveal, percentile_rank
 
 _COLUMNS, _ROWS = 16, 8  # pixels of a block
 _BINS = 8  # pixels of an RGBA32UI texel
@@ -35,13 +35,14 @@ class Measurer:
     def __init__(self, ctx: moderngl.Context, programs: Programs) -> None:
         self.ctx = ctx
         self.programs = programs
-        # Black beyond the edge: a block that sticks out counts no pixel twice.
-        self._sampler = ctx.sampler(
-            repeat_x=False,
-            repeat_y=False,
-            filter=(moderngl.NEAREST, moderngl.NEAREST),
-            border_color=(0.0, 0.0, 0.0, 0.0),
-        )
+        texels = {
+            "repeat_x": False,
+            "repeat_y": False,
+            "filter": (moderngl.NEAREST, moderngl.NEAREST),
+        }
+        self._inside = ctx.sampler(**texels)
+        # Black beyond the edge: a block that sticks out counts no pixel twice. It costs a fifth.
+        self._beyond = ctx.sampler(**texels, border_color=(0.0, 0.0, 0.0, 0.0))
         self._targets: dict[str, moderngl.Framebuffer] = {}
         self._fovea = FovealSampler(ctx, programs)
 
@@ -55,17 +56,20 @@ class Measurer:
     ) -> Statistics | None:
         """Statistics of an RGB(A) float texture in cd/m2; None where nothing is needed.
 
-        NaN and negative channels count as 0, infinity as colour.BRIGHTEST. With FOVEAL the
-        averages are measured too; ``field`` is the frame's width and height in degrees (default:
-        eye.foveal.default_field). Row 0 is the bottom one unless ``top_first``.
+        NaN and negative channels count as 0, infinity as colour.BRIGHTEST. With FOVEAL alone
+        all others are estimated (operator.of_foveal); ``field`` is the frame's width and height
+        in degrees (default: eye.foveal.default_field). Row 0 is the bottom one unless
+        ``top_first``.
         """
         if need == Need.NOTHING:
             return None
-        stats = self._luminances(hdr, Need.PERCENTILES in need)
-        if Need.FOVEAL not in need:
-            return stats
-        field = field or default_field(*hdr.size)
-        return replace(stats, foveal=self._fovea.sample(hdr, field, top_first=top_first))
+        found = None
+        if Need.FOVEAL in need:
+            field = field or default_field(*hdr.size)
+            found = self._fovea.sample(hdr, field, top_first=top_first)
+            if need == Need.FOVEAL:
+                return of_foveal(found)
+        return replace(self._luminances(hdr, Need.PERCENTILES in need), foveal=found)
 
     def release(self) -> None:
         """Free the targets."""
@@ -75,7 +79,8 @@ class Measurer:
             target.release()
         self._targets.clear()
         self._fovea.release()
-        self._sampler.release()
+        self._inside.release()
+        self._beyond.release()
 
     def _luminances(self, hdr: moderngl.Texture, percentiles: bool) -> Statistics:
         width, height = hdr.size
@@ -85,6 +90,7 @@ class Measurer:
             {"COLUMNS": _COLUMNS, "ROWS": _ROWS},
             (-(-width // _COLUMNS), -(-height // _ROWS)),
             ((4, "f4"), (1, "f4")),
+            whole=width % _COLUMNS == 0 and height % _ROWS == 0,
         )
         counted = _read(target, 0, 4, "f4").reshape(-1, 4)
         logs, number = counted[:, :2].sum(axis=0, dtype=np.float64)
@@ -102,7 +108,12 @@ class Measurer:
     def _percentiles(self, hdr: moderngl.Texture, percents: tuple[int, ...]) -> list[float]:
         width, height = hdr.size
         target = self._draw(
-            hdr, "gpu/shaders/bins.frag", {}, (-(-width // _BINS), height), ((4, "u4"),)
+            hdr,
+            "gpu/shaders/bins.frag",
+            {},
+            (-(-width // _BINS), height),
+            ((4, "u4"),),
+            whole=width % _BINS == 0,
         )
         bins = np.bincount(_read(target, 0, 4, "u4").view(np.uint16), minlength=1 << 15)
         bins[0] = 0  # what was not counted
@@ -118,8 +129,13 @@ class Measurer:
         defines: dict[str, int],
         size: tuple[int, int],
         layers: tuple[tuple[int, str], ...],
+        *,
+        whole: bool,
     ) -> moderngl.Framebuffer:
-        """Run a pass over ``hdr`` into a target of ``size`` with (components, type) layers."""
+        """Run a pass over ``hdr`` into a target of ``size`` with (components, type) layers.
+
+        ``whole``: it reads nothing outside of the frame.
+        """
         target = self._targets.get(fragment)
         if target is None or target.size != size:
             if target is not None:
@@ -132,10 +148,11 @@ class Measurer:
         texel = 1.0 / hdr.width, 1.0 / hdr.height
         set_uniforms(vertices.program, {"hdr": 0, "texel": texel})
         hdr.use(0)
-        self._sampler.use(0)
+        sampler = self._inside if whole else self._beyond
+        sampler.use(0)
         with self.ctx.scope(target, moderngl.NOTHING):
             vertices.render(vertices=3)
-        self._sampler.clear(0)
+        sampler.clear(0)
         return target
 
 

@@ -42,7 +42,8 @@ class Statistics:
 
     A frame without such a pixel has FLOOR everywhere. ``p01`` and ``p99`` are the
     luminances that 1 % and 99 % of the pixels do not exceed, ``foveal`` the frame in samples
-    of one degree; None where nobody asked for them.
+    of one degree; None where nobody asked for them. Where nobody asked for anything but
+    ``foveal``, the others are estimates from it (``of_foveal``).
     """
 
     log_average: float
@@ -80,7 +81,24 @@ def statistics(
     found = None
     if need is not None and Need.FOVEAL in need:
         found = foveal(rgb, field or default_field(rgb.shape[1], rgb.shape[0]))
+        if need == Need.FOVEAL:
+            return of_foveal(found)
     return replace(_luminances(luminance(rgb).ravel()), foveal=found)
+
+
+def of_foveal(found: Foveal) -> Statistics:
+    """What a foveal image tells of its whole frame, which is for people to read.
+
+    The average is that of its samples, which may differ by a pixel in size; the others are of
+    its single pixels, which are spread evenly at random: some 40,000 in a frame of 60 degrees.
+    """
+    return replace(
+        _luminances(found.points),
+        average=float(found.luminance.mean()),
+        p01=None,
+        p99=None,
+        foveal=found,
+    )
 
 
 def _luminances(y: Array) -> Statistics:

@@ -7,6 +7,12 @@ uniform int width, samples; // pixels and foveal samples across
 
 layout(location = 0) out vec4 sum;
 
+// Of the pixel x in the row of this fragment.
+vec3 light(int x)
+{
+    return clean(textureLod(hdr, (vec2(float(x), floor(gl_FragCoord.y)) + 0.5) * texel, 0.0).rgb);
+}
+
 // First pixel of a sample; as eye/foveal.py borders().
 int border(int i)
 {
@@ -15,11 +21,13 @@ int border(int i)
 
 void main()
 {
-    ivec2 at = ivec2(gl_FragCoord.xy);
-    int end = border(at.x + 1);
+    int i = int(gl_FragCoord.x);
+    int begin = border(i), last = border(i + 1) - 1;
     vec3 total = vec3(0.0);
-    for (int x = border(at.x); x < end; ++x) {
-        total += clean(textureLod(hdr, (vec2(x, at.y) + 0.5) * texel, 0.0).rgb);
+    for (int x = 0; x < EACH; ++x) {
+        total += light(begin + x);
     }
-    sum = vec4(total, 1.0);
+    // Every sample has EACH = width / samples pixels, or one more.
+    vec3 more = light(last);
+    sum = vec4(total + (last - begin == EACH ? more : vec3(0.0)), 1.0);
 }

@@ -2,6 +2,8 @@
 // position, w | intensity, 1/radius^2 | axis, exponent | x, inner | y, 1/width | factor on
 // diffuse, factor on specular, link, radius (of a distant light: tangent of half its angle);
 // then those of its shadow (SHADOW_ROWS), then those of its profile.
+// First: a file is included once, and in a branch that is not taken it would be nowhere.
+#include "photometry/arc.glsl"
 #if defined(RECT) || defined(DISK) || defined(SPHERE) || defined(CYLINDER) || defined(DISTANT)
 #include "photometry/area.glsl"
 #endif
