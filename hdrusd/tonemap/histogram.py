@@ -92,7 +92,7 @@ def histogram(
     w = np.concatenate([w, np.full(points.size, w.sum() / max(points.size, 1))])
     y = np.concatenate([samples, points])
     counted = (y > VOID) & (w > 0.0)
-    if counted.any():
+    if counted.any() and not counted.all():
         y, w = y[counted], w[counted]
     darkest = min(max(float(y.min()), DARKEST_SEEN), BRIGHTEST_SEEN)
     bmin = math.log(darkest)
@@ -100,13 +100,13 @@ def histogram(
     bmax = math.log(max(min(float(y.max()), BRIGHTEST_SEEN), darkest)) + math.log(1.01)
     split = int(pcond and darkest > DARKEST_SEEN)
     bmin = bmax - (bmax - bmin) * bins / (bins - split)
-    b = np.log(np.clip(y, DARKEST_SEEN, BRIGHTEST_SEEN))
-    place = np.clip((b - bmin) * (bins / (bmax - bmin)), split, bins - 1.0).astype(np.intp)
+    b = np.log(y.clip(DARKEST_SEEN, BRIGHTEST_SEEN))
+    place = ((b - bmin) * (bins / (bmax - bmin))).clip(split, bins - 1.0).astype(np.intp)
     counts = np.bincount(place, weights=w, minlength=bins)
     if split:
         counts[1] *= 0.5
         counts[0] += counts[1]
-    return Histogram(counts, bmin, bmax, float(np.average(b, weights=w)))
+    return Histogram(counts, bmin, bmax, float((b * w).sum()) / float(w.sum()))
 
 
 class Anchor(NamedTuple):
@@ -239,7 +239,7 @@ def fill(
         after = log_display + change - back * (log_display - before + turn)
         if number >= _QUICK:
             after = log_display + 0.5 * change
-        before, log_display = log_display, np.clip(after, bottom, bottom + span)
+        before, log_display = log_display, after.clip(bottom, bottom + span)
     return Curve(h.bmin, h.bmax, bottom + offset + u, low, high)
 
 

@@ -10,7 +10,7 @@ layout(location = 0) out vec4 sum;
 // Of the pixel x in the row of this fragment.
 vec3 light(int x)
 {
-    return clean(textureLod(hdr, (vec2(float(x), floor(gl_FragCoord.y)) + 0.5) * texel, 0.0).rgb);
+    return clean(textureLod(hdr, vec2(float(x) + 0.5, gl_FragCoord.y) * texel, 0.0).rgb);
 }
 
 // First pixel of a sample; as eye/foveal.py borders().
