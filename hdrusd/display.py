@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hdrusd.by_products import ByProducts, playback_rate
 from hdrusd.course import Checkpoints, Course, Cut, Start
@@ -26,6 +27,9 @@ from hdrusd.viewing import Eye, ReferenceEye, Shown, Sight, Viewing, with_rods
 
 #: Pictures that wait for the writer; each holds a frame in memory.
 _WAITING = 2
+
+#: What read_exr_layers gives.
+_Layers = tuple[npt.NDArray[np.float32], dict[str, Any], dict[str, npt.NDArray[np.float32]]]
 
 #: Frames a second where neither the user nor the file says (UsdStage's default).
 DEFAULT_FPS = 24.0
@@ -109,7 +113,7 @@ def tonemap_sequence(
     if 0 < begin < len(jobs):
         camera = read_exr_header(jobs[begin - 1][1]).get("hdrusd:camera")
     clock = _Clock(showing.fps, report if in_time and len(jobs) > 1 else Report())
-    with Writer() as writer, _by_products(jobs, showing) as beside:
+    with Reader() as reader, Writer() as writer, _by_products(jobs, showing) as beside:
         try:
             for index, (frame, source, target) in enumerate(jobs):
                 there = showing.resume and target.is_file()
@@ -118,7 +122,7 @@ def tonemap_sequence(
                     yield Seen(frame, target, math.nan, None, None)
                     continue
                 eye = eye or _Eye(showing, course)
-                rgb, header, layers = read_exr_layers(source)
+                rgb, header, layers = reader.read(source, _next_source(jobs, index, showing))
                 _note_units(source, header, report)
                 time = clock.time(frame, source, header)
                 if camera not in (None, header.get("hdrusd:camera")):
@@ -140,6 +144,15 @@ def tonemap_sequence(
                 states.save()
             if eye is not None:
                 eye.release()
+
+
+def _next_source(
+    jobs: Sequence[tuple[float, Path, Path]], index: int, showing: Showing
+) -> Path | None:
+    """The file that will be read after that of a job."""
+    every = not showing.resume or (showing.viewing.operator.advance and not showing.stills)
+    later = range(index + 1, len(jobs))
+    return next((jobs[i][1] for i in later if every or not jobs[i][2].is_file()), None)
 
 
 def _by_products(jobs: Sequence[tuple[float, Path, Path]], showing: Showing) -> ByProducts:
@@ -276,6 +289,34 @@ def _note_units(source: Path, header: Mapping[str, Any], report: Report) -> None
     if primaries is not None and not np.allclose(np.ravel(primaries), REC709, rtol=0, atol=1e-3):
         text = f"chromaticities {np.ravel(primaries).round(4).tolist()} are read as Rec. 709"
         report.add(Kind.REPLACED, "exr-primaries", place, "", text)
+
+
+class Reader:
+    """One thread that reads the next frame while the caller works on this one.
+
+    What cannot be read is raised when its turn comes, not before. Leaving the block waits for the
+    frame in hand.
+    """
+
+    def __init__(self) -> None:
+        self._pool = ThreadPoolExecutor(1, "hdrusd-reader")
+        self._ahead: tuple[Path, Future[_Layers]] | None = None
+
+    def __enter__(self) -> Reader:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._pool.shutdown(cancel_futures=True)
+
+    def read(self, source: Path, ahead: Path | None = None) -> _Layers:
+        """``read_exr_layers`` of ``source``; then ``ahead`` is read, and kept for the next call."""
+        found, self._ahead = self._ahead, None
+        if found is None or found[0] != source:
+            found = source, self._pool.submit(read_exr_layers, source)
+        result = found[1].result()
+        if ahead is not None:
+            self._ahead = ahead, self._pool.submit(read_exr_layers, ahead)
+        return result
 
 
 class Writer:

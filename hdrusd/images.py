@@ -201,7 +201,8 @@ def read_exr_layers(
         raise InputError(path, f"channels {', '.join(sorted(channels))}; want R, G, B or Y")
     if any(channels[name].shape != (height, width) for name in names):
         raise InputError(path, "channels of different sizes; want whole ones")
-    rgb = np.stack([channels[names[i % len(names)]].astype(np.float32) for i in range(3)], axis=-1)
+    planes = [channels[names[i % len(names)]].astype(np.float32, copy=False) for i in range(3)]
+    rgb = np.stack(planes, axis=-1)
     white = float(header.get("whiteLuminance", 1.0))
     if not 0.0 < white < np.inf:
         raise InputError(path, f"whiteLuminance {white:g}; want a positive number")

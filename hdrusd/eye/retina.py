@@ -29,8 +29,8 @@ Array = npt.NDArray[Any]
 #: Retinal illuminances between which an equivalent adaptation is looked for, td.
 _DIMMEST, _BRIGHTEST = 1e-9, 1e9
 
-#: Steps of Ridders' method at most, each at least a halving of ln(1e9 / 1e-9), and the last
-#: one's size in ln units at which it ends: the error is about its square by then.
+#: Steps of Ridders' method at most, each at least a halving of ln(1e9 / 1e-9), and the change
+#: in ln units at which it ends: the error is less than a hundredth of it by then.
 _STEPS, _SMALL = 52, 1e-7
 
 #: Loss of log10 sensitivity for each share of rod pigment that is bleached too much: 1.2 for
@@ -172,9 +172,10 @@ def equivalent(receptor: Receptor, state: Adaptation) -> float:
     for _ in range(_STEPS):
         middle = 0.5 * (low + high)
         at_middle = above(middle)
-        last, found = found, middle - (middle - low) * at_middle / math.sqrt(
-            at_middle**2 - at_low * at_high
-        )
+        if at_middle == 0.0:
+            return math.exp(middle)
+        last = found
+        found = middle - (middle - low) * at_middle / math.sqrt(at_middle**2 - at_low * at_high)
         if abs(found - last) < _SMALL:
             break
         at_found = above(found)
@@ -183,8 +184,6 @@ def equivalent(receptor: Receptor, state: Adaptation) -> float:
                 low, at_low = ln, at
             elif at >= 0.0 and ln < high:
                 high, at_high = ln, at
-        if at_low == 0.0 or at_high == 0.0:
-            return math.exp(low if at_low == 0.0 else high)
     return math.exp(found)
 
 

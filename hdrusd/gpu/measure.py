@@ -35,14 +35,12 @@ class Measurer:
     def __init__(self, ctx: moderngl.Context, programs: Programs) -> None:
         self.ctx = ctx
         self.programs = programs
-        texels = {
-            "repeat_x": False,
-            "repeat_y": False,
-            "filter": (moderngl.NEAREST, moderngl.NEAREST),
-        }
-        self._inside = ctx.sampler(**texels)
+        nearest = moderngl.NEAREST, moderngl.NEAREST
+        self._inside = ctx.sampler(repeat_x=False, repeat_y=False, filter=nearest)
         # Black beyond the edge: a block that sticks out counts no pixel twice. It costs a fifth.
-        self._beyond = ctx.sampler(**texels, border_color=(0.0, 0.0, 0.0, 0.0))
+        self._beyond = ctx.sampler(
+            repeat_x=False, repeat_y=False, filter=nearest, border_color=(0.0, 0.0, 0.0, 0.0)
+        )
         self._targets: dict[str, moderngl.Framebuffer] = {}
         self._fovea = FovealSampler(ctx, programs)
 

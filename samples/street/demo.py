@@ -35,7 +35,7 @@ TIME_CODES = 24  # a second
 #: A car overtakes, its tail lamps are near, the oncoming car dazzles.
 ROWS = (45, 65, 93)
 CAMERA, SIZE = "WetRoad", (960, 540)
-WIDTH = 480  # of a picture in the video and on the sheet
+WIDTH = SIZE[0] // 2  # of a picture in the video and on the sheet
 
 #: Operators of the columns: name of the files, heading, options.
 COLUMNS = (
@@ -50,7 +50,7 @@ OTHERS = (
     (
         "falsecolour",
         "luminance",
-        ("--operator", "falsecolour", "--set", "scale=10000", "--set", "decades=6"),
+        ("--operator", "falsecolour", "--set", "scale=10000", "--set", "decades=5"),
     ),
     (
         "elderly",
@@ -108,9 +108,17 @@ def write_daylight(out: Path) -> Path:
 
 
 def read_pictures(out: Path, looks: Iterable[str], frame: int) -> list[np.ndarray]:
-    """(h, w, 3) uint8 of each look at a frame."""
+    """(h / 2, w / 2, 3) uint8 of each look at a frame."""
     files = [out / "frames" / f"{look}.{frame:04d}.png" for look in looks]
-    return [np.asarray(oiio.ImageBuf(str(f)).get_pixels(oiio.UINT8))[..., :3] for f in files]
+    pictures = [oiio.ImageBuf(str(file)).get_pixels(oiio.UINT8) for file in files]
+    return [halve(np.asarray(picture)[..., :3]) for picture in pictures]
+
+
+def halve(picture: np.ndarray) -> np.ndarray:
+    """Half the size, each pixel the mean of four: quicker than a filter, 96 times."""
+    h, w = picture.shape[0] // 2, picture.shape[1] // 2
+    blocks = picture[: 2 * h, : 2 * w].reshape(h, 2, w, 2, 3)
+    return (blocks.mean(axis=(1, 3)) + 0.5).astype(np.uint8)
 
 
 def moment(frame: int) -> str:
