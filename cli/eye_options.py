@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from hdrusd.eye.observer import Observer
     from hdrusd.eye.screen import Screen
     from hdrusd.glare.model import GlareModel
-    from hdrusd.tonemap.operator import Operator
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -121,24 +120,19 @@ def chosen_glare(options: dict[str, Any]) -> GlareModel | None:
     return None if name in (None, "none") else MODELS[name]
 
 
-def chosen_start(options: dict[str, Any], operator: Operator, first: float) -> Start:
-    """What the eye did before the frame ``first``. Raises UsageError, InputError."""
-    from hdrusd.course import Start, read_state
+def chosen_start(options: dict[str, Any], first: float) -> Start:
+    """What the eye did before the frame ``first``. Raises UsageError."""
+    from hdrusd.course import Start
 
     text, file, warm_up = options["adapt_from"], options["state_in"], options["warm_up"]
     if text is not None and file is not None:
         raise click.UsageError("--adapt-from and --state-in exclude one another")
-    if text is None and file is None:
-        if warm_up:
-            raise click.UsageError("--warm-up: want --adapt-from or --state-in too")
-        return Start()
-    if operator.advance is None:
-        name = "--adapt-from" if file is None else "--state-in"
-        raise click.UsageError(f"{name}: {operator.name} has no state; see: hdrusd operators")
+    if text is None and file is None and warm_up:
+        raise click.UsageError("--warm-up: want --adapt-from or --state-in too")
     if file is not None:
-        state, time = read_state(file, operator, first)
-        return Start(state=state, time=time, warm_up=warm_up)
-    return Start(*_adapted(text), warm_up=warm_up)
+        return Start(file=file, before=first, warm_up=warm_up)
+    luminance, seconds = _adapted(text) if text is not None else (None, None)
+    return Start(luminance, seconds, warm_up=warm_up)
 
 
 def _adapted(text: str) -> tuple[float, float | None]:

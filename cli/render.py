@@ -227,7 +227,6 @@ def command(stage: Path, output: str, **options: Any) -> None:
 def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
     """The options as a Job. Raises UsageError for what does not go together."""
     from hdrusd.job import Job
-    from hdrusd.tonemap.operator import DEFAULT_OPERATOR, OPERATORS
 
     suffix = Path(output).suffix.lower()
     if suffix not in (".exr", ".png"):
@@ -266,7 +265,7 @@ def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
         screen=chosen_screen(options),
         glare=chosen_glare(options),
         **night_vision(options),
-        start=chosen_start(options, operator or OPERATORS[DEFAULT_OPERATOR], first),
+        start=chosen_start(options, first),
         cut=options["cut"],
         cuts=chosen_cuts(options),
         states=options["state_out"] or (beside(png, ".json") if png else None),
@@ -298,14 +297,15 @@ def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:
 #: Options that say how a picture is made of a frame.
 _OF_PICTURES = (
     *("operator", "settings", "observer", "screen", "glare", "video", "plot", "cuts"),
-    *("adapt_from", "state_in", "state_out"),
+    *("adapt_from", "state_in", "state_out", "warm_up"),
 )
 
 
 def _no_picture(options: dict[str, Any]) -> None:
     """Raise UsageError for options that want a picture where there is none."""
-    for name in _OF_PICTURES:
-        if options[name]:
+    usual = {"night_vision": "none", "cut": "keep"}
+    for name in (*_OF_PICTURES, *usual):
+        if options[name] and options[name] != usual.get(name):
             option = "set" if name == "settings" else name.replace("_", "-")
             raise click.UsageError(f"--{option}: nothing is tone mapped; want --png or OUTPUT.png")
 

@@ -136,12 +136,12 @@ def _showing(output: str, first: float, options: dict[str, Any]) -> Any:
     )
     return Showing(
         viewing,
-        start=chosen_start(options, operator, first),
+        start=chosen_start(options, first),
         cut=options["cut"],
         cuts=chosen_cuts(options),
         stills=not options["sequence"],
         fps=options["fps"],
-        across=options["across"] or screen.field,
+        across=options["across"],
         states=options["state_out"] or (beside(output, ".json") if options["sequence"] else None),
         log=beside(output, ".csv"),
         plot=plot_file(output, options),

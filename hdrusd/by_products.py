@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 
 from hdrusd.adaptation_log import AdaptationLog, check_plot
-from hdrusd.colour import luminance
+from hdrusd.colour import from_rec2020, luminance
+from hdrusd.course import EVERY
+from hdrusd.errors import ParameterError
 from hdrusd.eye.screen import Screen
 from hdrusd.images import read_image
 from hdrusd.tonemap.operator import Moment, Operator
@@ -51,13 +53,17 @@ class ByProducts:
         video: Path | None = None,
         fps: float = 24.0,
         resume: bool = False,
+        screen: Screen | None = None,
     ) -> None:
         if plot is not None:
             check_plot()
+        if video is not None and screen is not None and screen.eotf == "pq":
+            raise ParameterError(f"video: screen {screen.name} is PQ; want an SDR screen")
         self.operator = operator
         self.csv = csv
         self.plot = plot
         self.log = AdaptationLog()
+        self._seen = 0
         if resume and csv is not None and csv.is_file():
             self.log = AdaptationLog.read_csv(csv)
         self._stack = contextlib.ExitStack()
@@ -97,6 +103,10 @@ class ByProducts:
             if self.csv is not None:
                 numbers[SCREEN] = screen_luminance(pixels(), moment.screen)
             self.log.add(frame, time, numbers)
+            # As often as states are saved, so that a killed run's table is as long as they go.
+            if self.csv is not None and self._seen % EVERY == 0:
+                self.log.write_csv(self.csv)
+            self._seen += 1
         if self._video is not None and (picture is not None or file is not None):
             self._video.add(eight_bits(pixels()))
 
@@ -123,15 +133,25 @@ def playback_rate(fps: float, frames: Sequence[float]) -> float:
 
 def screen_luminance(picture: Any, screen: Screen) -> float:
     """Mean luminance, cd/m2, that ``screen`` shows of code values (h, w, 3), reflections too."""
-    codes = eight_bits(picture)
-    levels = decoded(np.arange(256) / 255.0, screen)
-    by_channel = [levels @ np.bincount(codes[..., i].ravel(), minlength=256) for i in range(3)]
-    share = 3.0 * float(luminance(np.array(by_channel))) / codes.size
-    return float(screen.black_level + share * (screen.white_level - screen.black_level))
+    codes = picture if picture.dtype.kind == "u" else sixteen_bits(picture)
+    most = 1 << (8 * codes.itemsize)
+    levels = decoded(np.arange(most) / (most - 1.0), screen)
+    counts = (np.bincount(codes[..., i].ravel(), minlength=most) for i in range(3))
+    linear = np.array([levels @ count for count in counts]) * (3.0 / codes.size)
+    if screen.eotf == "pq":  # cd/m2 already, of other primaries
+        return float(luminance(from_rec2020(linear))) + screen.reflected
+    return float(screen.black_level + luminance(linear) * (screen.peak - screen.black))
+
+
+def sixteen_bits(picture: Any) -> Any:
+    """Code values [0, 1], as a PNG of 16 bits is read, as the integers they were."""
+    return (picture * 65535.0 + 0.5).astype(np.uint16)
 
 
 def eight_bits(picture: Any) -> Any:
-    """Code values of 16 bits as 8, rounded; 8 bits as they are."""
+    """Code values of 16 bits, or [0, 1], as 8, rounded; 8 bits as they are."""
+    if picture.dtype.kind == "f":
+        return (picture * 255.0 + 0.5).astype(np.uint8)
     if picture.dtype == np.uint16:
         return ((picture.astype(np.uint32) * 255 + 32767) // 65535).astype(np.uint8)
     return np.ascontiguousarray(picture)

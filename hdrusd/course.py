@@ -12,11 +12,11 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from hdrusd.errors import HdrusdError, InputError
+from hdrusd.errors import InputError, ParameterError
 from hdrusd.images import read_exr_header, write_atomically
 from hdrusd.tonemap.operator import Moment, Operator, State, statistics
 
@@ -28,11 +28,19 @@ EVERY = 24
 
 _FORMAT = "hdrusd-eye/1"
 
-#: Bytes of a file of states: some thousand of them.
-_LARGEST = 1 << 26
+#: Bytes of a file of states: some thousand of them. Numbers that a state may have, and how deep.
+_LARGEST, _MOST, _DEEPEST = 1 << 26, 10_000, 4
 
 #: cd/m2 of the dark that ``Start.seconds`` begins in.
 _DARK = 1e-6
+
+
+class Known(NamedTuple):
+    """The state of the eye after a frame at ``time`` s, by a ``camera`` (None: unknown)."""
+
+    time: float
+    state: State | None
+    camera: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,19 +49,24 @@ class Start:
 
     Nothing said: it has looked at the first frame until nothing changed any more. Else it is
     adapted to an even field of ``luminance`` cd/m2; with ``seconds`` it was in the dark and then
-    saw that field for so long. Or it comes from another run in ``state``, which it had at
-    ``time`` (s; None: just now). Then it sees the first frame for ``warm_up`` s.
+    saw that field for so long. Or it comes from another run, whose states are in ``file``
+    (``read_state``), with that of the latest frame before the number ``before``. Then it sees the
+    first frame for ``warm_up`` s.
     """
 
     luminance: float | None = None
     seconds: float | None = None
-    state: State | None = None
-    time: float | None = None
+    file: Path | None = None
+    before: float = math.inf
     warm_up: float = 0.0
 
 
 class Course:
-    """The state of an operator through frames in the order in which they are seen."""
+    """The state of an operator through frames in the order in which they are seen.
+
+    A frame whose number is in ``cuts`` begins a new view, and so does one of another camera.
+    Raises ParameterError for a start that the operator cannot have, InputError for its file.
+    """
 
     def __init__(
         self,
@@ -66,40 +79,50 @@ class Course:
         self.start = start or Start()
         self.cut = cut
         self.cuts = frozenset(cuts)
-        self.state: State | None = None
-        self.time: float | None = None
+        self.known: Known | None = None  # after the frame before
+        self._given: Known | None = None
+        if operator.advance is None and self.start != Start():
+            raise ParameterError(
+                f"{operator.name}: has no state to start with; want an operator in time"
+            )
+        if self.start.file is not None:
+            self._given = read_state(self.start.file, operator, self.start.before)
 
-    def resume(self, state: State | None, time: float | None) -> None:
-        """Go on from a frame at ``time`` s that had ``state``."""
-        self.state, self.time = state, time
+    def resume(self, known: Known) -> None:
+        """Go on from a frame of this course."""
+        self.known = known
 
-    def advance(self, moment: Moment, time: float, frame: float = math.nan) -> Moment:
+    def advance(
+        self, moment: Moment, time: float, frame: float = math.nan, camera: str | None = None
+    ) -> Moment:
         """``moment`` of the frame at ``time`` s with its state; ``frame`` is its number."""
         advance = self.operator.advance
         if advance is None:
             return moment
-        if self.time is None:
-            state, dt = self._begin(moment, time)
+        before = self.known or self._given
+        if self.known is not None:
+            state, dt = self.known.state, abs(time - self.known.time)
         else:
-            state, dt = self.state, abs(time - self.time)
-        if self.cut == "reset" and frame in self.cuts:
+            state, dt = self._begin(moment, time)
+        other = before is not None and before.camera is not None and before.camera != camera
+        if self.cut == "reset" and (other or frame in self.cuts):
             state, dt = None, math.inf
         try:
-            self.state, self.time = advance(state, moment, dt), time
-        except (KeyError, TypeError, ValueError) as problem:
-            if state is not self.start.state:
+            after = advance(state, moment, dt)
+        except (KeyError, TypeError, ValueError, OverflowError) as problem:
+            if state is None:
                 raise
-            text = f"{self.operator.name}: the given state is not one of its own ({problem!r})"
-            raise HdrusdError(text) from problem
-        return replace(moment, state=self.state)
+            text = f"{self.operator.name}: state: not one of its own ({problem!r})"
+            raise ParameterError(text) from problem
+        self.known = Known(time, after, camera)
+        return replace(moment, state=after)
 
     def _begin(self, moment: Moment, time: float) -> tuple[State | None, float]:
         """The state before the first frame, and for how long it is looked at."""
-        advance, start = self.operator.advance, self.start
+        advance, start, given = self.operator.advance, self.start, self._given
         assert advance is not None
-        if start.state is not None:
-            since = 0.0 if start.time is None else max(time - start.time, 0.0)
-            return start.state, since + start.warm_up
+        if given is not None:
+            return given.state, max(time - given.time, 0.0) + start.warm_up
         if start.luminance is None:
             return None, math.inf
         field_ = self._even(moment, start.luminance)
@@ -119,54 +142,60 @@ class Course:
 
 @dataclass(slots=True)
 class Checkpoints:
-    """States by frame in a JSON file: of every EVERY-th frame, and of the last.
+    """What is known by frame, in a JSON file: of every EVERY-th frame, and of the last.
 
-    ``setup`` says all that the states depend on beside the frames; a file with another setup is
-    refused.
+    ``setup`` says all that the states depend on beside the frames, its "start" what the eye did
+    before them; a file with another setup is refused.
     """
 
     file: Path
     operator: str
     setup: Mapping[str, Any]
-    states: dict[float, tuple[float, State]] = field(default_factory=dict)  # frame: time, state
-    _last: tuple[float, float, State] | None = None
+    states: dict[float, Known] = field(default_factory=dict)
+    _last: tuple[float, Known] | None = None
     _since: int = 0
 
-    def load(self) -> None:
-        """Take in the file, where there is one. Raises InputError."""
+    def load(self, whole: bool = True) -> None:
+        """Take in the file, where there is one. Raises InputError.
+
+        Not ``whole``: this run is the other part of the sequence in the file, and goes on with
+        it; whatever else is there is replaced.
+        """
         if not self.file.is_file():
             return
         document = _document(self.file)
-        if document.get("setup") != json.loads(json.dumps(self.setup)):
+        setup, own = document.get("setup"), _plain(self.setup)
+        if not whole:
+            if not isinstance(setup, dict) or {**setup, "start": None} != {**own, "start": None}:
+                return
+            self.setup = setup
+        elif setup != own:
             raise InputError(
                 self.file,
                 "states of a sequence with other settings; want the same, or another output",
             )
         self.states = _states(self.file, document)
 
-    def keep(self, frame: float, time: float, state: State | None) -> None:
-        """Take in the state of a frame, written when it is its turn or with ``save``."""
-        if state is None:
+    def keep(self, frame: float, known: Known) -> None:
+        """Take in what is known after a frame, written when it is its turn or with ``save``."""
+        if known.state is None:
             return
-        self._last = frame, time, state
+        self._last = frame, known
         if self._since == 0:
             self.save()
         self._since = (self._since + 1) % EVERY
 
     def save(self) -> None:
-        """Write the file, the state of the latest frame in it."""
+        """Write the file, the latest frame in it."""
         if self._last is None:
             return
-        frame, time, state = self._last
-        self.states[frame] = time, state
+        frame, known = self._last
+        self.states[frame] = known
         document = {
             "format": _FORMAT,
             "operator": self.operator,
-            "setup": self.setup,
-            "states": [
-                {"frame": number, "time": when, "state": values}
-                for number, (when, values) in self.states.items()
-            ],
+            "setup": _plain(self.setup),
+            "states": [_entry(number, known) for number, known in self.states.items()],
         }
         text = json.dumps(document, indent=1, allow_nan=False) + "\n"
 
@@ -176,15 +205,14 @@ class Checkpoints:
         write_atomically(self.file, write)
 
 
-def read_state(path: Path, operator: Operator, before: float = math.inf) -> tuple[State, float]:
-    """The state of the latest frame before ``before``, and its time in s.
+def read_state(path: Path, operator: Operator, before: float = math.inf) -> Known:
+    """What is known after the latest frame before ``before``.
 
     From a file of Checkpoints, or from the header of an EXR frame. Raises InputError, also for
     the state of another operator.
     """
     if path.suffix.lower() == ".exr":
-        header = read_exr_header(path)
-        text = header.get("hdrusd:state")
+        text = read_exr_header(path).get("hdrusd:state")
         if not isinstance(text, str):
             raise InputError(path, "no hdrusd:state in its header; want a frame that an eye saw")
         document = _parsed(path, text)
@@ -193,18 +221,32 @@ def read_state(path: Path, operator: Operator, before: float = math.inf) -> tupl
     if document.get("operator") != operator.name:
         raise InputError(path, f"state of {document.get('operator')}; want one of {operator.name}")
     states = _states(path, document)
-    known = [number for number in states if number < before]
-    if not known:
+    numbers = [number for number in states if number < before]
+    if not numbers:
         raise InputError(path, f"no state of a frame before {before:g}")
-    time, state = states[max(known)]
-    return state, time
+    return states[max(numbers)]
 
 
-def state_text(operator: Operator, frame: float, time: float, state: State) -> str:
+def state_text(operator: Operator, frame: float, known: Known) -> str:
     """What the header of an EXR frame says in ``hdrusd:state``; ``read_state`` reads it."""
-    states = [{"frame": frame, "time": time, "state": state}]
-    document = {"format": _FORMAT, "operator": operator.name, "states": states}
+    document = {"format": _FORMAT, "operator": operator.name, "states": [_entry(frame, known)]}
     return json.dumps(document, allow_nan=False)
+
+
+def _entry(frame: float, known: Known) -> dict[str, Any]:
+    entry = {"frame": frame, "time": known.time, "state": known.state}
+    return entry if known.camera is None else {**entry, "camera": known.camera}
+
+
+def _plain(value: Any) -> Any:
+    """Settings as JSON has them: infinity and paths in words."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return repr(value)
+    return value if value is None or isinstance(value, (bool, int, float, str)) else str(value)
 
 
 def _document(path: Path) -> Mapping[str, Any]:
@@ -228,15 +270,27 @@ def _parsed(path: Path, text: str) -> Mapping[str, Any]:
     return document
 
 
-def _states(path: Path, document: Mapping[str, Any]) -> dict[float, tuple[float, State]]:
-    states: dict[float, tuple[float, State]] = {}
+def _states(path: Path, document: Mapping[str, Any]) -> dict[float, Known]:
+    states: dict[float, Known] = {}
     entries: Any = document.get("states")
     for entry in entries if isinstance(entries, list) else [{}]:
         try:
             frame, time, state = float(entry["frame"]), float(entry["time"]), entry["state"]
-        except (KeyError, TypeError, ValueError) as problem:
-            raise InputError(path, "states; want frame, time and state of each") from problem
-        if not (math.isfinite(frame) and math.isfinite(time) and isinstance(state, dict)):
-            raise InputError(path, "states; want frame, time and state of each")
-        states[frame] = time, state
+            sound = math.isfinite(frame) and math.isfinite(time) and isinstance(state, dict)
+            sound = sound and _finite(state)
+        except (KeyError, TypeError, ValueError, OverflowError):
+            sound = False
+        if not sound:
+            raise InputError(path, "states; want frame, time and state of each, finite numbers")
+        camera = entry.get("camera")
+        states[frame] = Known(time, state, camera if isinstance(camera, str) else None)
     return states
+
+
+def _finite(value: Any, depth: int = 0) -> bool:
+    """Whether a state holds nothing but finite numbers, in lists or under names."""
+    if isinstance(value, (dict, list)):
+        items = list(value.values()) if isinstance(value, dict) else value
+        few = depth < _DEEPEST and len(items) <= _MOST
+        return few and all(_finite(item, depth + 1) for item in items)
+    return isinstance(value, (int, float)) and math.isfinite(float(value))

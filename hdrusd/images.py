@@ -203,9 +203,9 @@ def read_exr_layers(
         raise InputError(path, "channels of different sizes; want whole ones")
     planes = [channels[names[i % len(names)]].astype(np.float32, copy=False) for i in range(3)]
     rgb = np.stack(planes, axis=-1)
-    white = float(header.get("whiteLuminance", 1.0))
-    if not 0.0 < white < np.inf:
-        raise InputError(path, f"whiteLuminance {white:g}; want a positive number")
+    white: Any = header.get("whiteLuminance", 1.0)
+    if not isinstance(white, (int, float)) or not 0.0 < white < np.inf:
+        raise InputError(path, f"whiteLuminance {white!s:.40}; want a positive number")
     layers = {
         name: channel.astype(np.float32)
         for name, channel in channels.items()

@@ -14,12 +14,14 @@ import numpy.typing as npt
 from pxr import Tf, UsdGeom
 
 from hdrusd.by_products import ByProducts, playback_rate
-from hdrusd.course import Checkpoints, Course, state_text
-from hdrusd.display import Writer, first_to_see
+from hdrusd.course import Checkpoints, Course, Known, state_text
+from hdrusd.display import first_to_see
 from hdrusd.errors import HdrusdError, InputError, SourceRef
 from hdrusd.eye.mesopic import mesopic_layer
 from hdrusd.eye.scotopic import scotopic
 from hdrusd.eye.screen import Screen
+from hdrusd.frame_header import lamps_text, most_dazzling
+from hdrusd.frame_io import Writer
 from hdrusd.frames import frame_path
 from hdrusd.gpu.hdr import HdrRenderer, Options
 from hdrusd.gpu.ldr import deep
@@ -29,13 +31,13 @@ from hdrusd.job import Job
 from hdrusd.photometry.eye_illuminance import eye_illuminance
 from hdrusd.photometry.scotopic_light import scotopic_scene
 from hdrusd.report import Kind, Report
-from hdrusd.scene import Camera, RenderScene
+from hdrusd.scene import Camera, Doubles, RenderScene
 from hdrusd.tonemap.operator import DEFAULT_OPERATOR, OPERATORS, Moment, Operator
 from hdrusd.usd.extract import StageReader
 from hdrusd.usd.opening import one_line_of, open_stage, usd_warnings
 from hdrusd.usd.settings import read_settings
 from hdrusd.usd.textures import TextureLoader
-from hdrusd.viewing import Eye, Sight, Viewing, reads_screen, with_rods
+from hdrusd.viewing import Eye, Sight, Viewing, reads_screen, with_exposure, with_rods
 
 #: Width of a picture that neither the stage nor the user sizes (usdrecord's).
 DEFAULT_WIDTH = 960
@@ -57,6 +59,7 @@ class Frame:
     skipped: bool = False
     light_error: float = 0.0  # bound of merging lamps (HdrRenderer.light_error); 0: each alone
     layers: Mapping[str, npt.NDArray[np.float32]] = field(default_factory=dict)  # (h, w)
+    lamps: npt.NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 6)))  # beside it
 
 
 class Renderer:
@@ -126,6 +129,11 @@ class Renderer:
                 text = f"frame {time:g}: {one_line_of(problem)}"
                 raise InputError(self.job.stage, text) from problem
 
+    def known(self, frame: Frame) -> Known:
+        """The state of the eye after a frame that it saw."""
+        state = None if frame.moment is None else frame.moment.state
+        return Known(self.seconds(frame.time), state, frame.camera.name)
+
     def release(self) -> None:
         """Free what is on the GPU."""
         if self.eye is not None:
@@ -142,24 +150,26 @@ class Renderer:
         texture = self.hdr.render(scene)
         self.textures.publish()
         hdr, moment, ldr = self.hdr.read(), None, None
+        lamps = most_dazzling(eye_illuminance(scene))
         if self.eye is not None and self.viewing is not None:
-            sight = self._sight(self.viewing, scene, camera, time)
+            sight = self._sight(self.viewing, camera, time, lamps)
             if rods is not None and self.viewing.night_colour:
                 shown = self.eye.show_array(with_rods(hdr, rods), replace(sight, rods=True))
             else:
                 shown = self.eye.show(texture, sight)
             moment, ldr = shown.moment, shown.picture
         error, layers = self.hdr.light_error, self._layers(hdr, rods)
-        return Frame(time, hdr, ldr, moment, camera, light_error=error, layers=layers)
+        return Frame(time, hdr, ldr, moment, camera, light_error=error, layers=layers, lamps=lamps)
 
-    def _sight(self, viewing: Viewing, scene: RenderScene, camera: Camera, time: float) -> Sight:
-        """What the eye has to know of a frame; of lamps beside it, where it is dazzled."""
+    def _sight(self, viewing: Viewing, camera: Camera, time: float, lamps: Doubles) -> Sight:
+        """What the eye has to know of a frame."""
         return Sight(
             self.seconds(time),
             time if math.isfinite(time) else 0.0,
             field_of_view(camera),
-            self._parameters(viewing.operator, camera),
-            eye_illuminance(scene) if viewing.glare is not None else None,
+            with_exposure(viewing, camera.exposure_scale),
+            lamps,
+            camera=camera.name,
         )
 
     def _rods(self, scene: RenderScene) -> npt.NDArray[np.float32] | None:
@@ -213,7 +223,7 @@ class Renderer:
                 self.report.add(Kind.DROPPED, "display-unused", SourceRef(job.stage), "", text)
         return Viewing(
             operator,
-            job.parameters,
+            self._parameters(operator),
             job.observer,
             screen,
             job.glare,
@@ -221,16 +231,14 @@ class Renderer:
             job.night_colour,
         )
 
-    def _parameters(self, operator: Operator, camera: Camera) -> dict[str, Any]:
-        """The user's, else the stage's for this operator, else the camera's exposure."""
+    def _parameters(self, operator: Operator) -> dict[str, Any]:
+        """The user's, else the stage's for this operator."""
         given = dict(self.job.parameters)
         names = {parameter.name for parameter in operator.parameters}
         if self.settings.operator == operator.name:
             for name, value in (("key", self.settings.key), ("white", self.settings.white)):
                 if name in names and value is not None:
                     given.setdefault(name, value)
-        if {"scale", "ev100"} <= names and not {"scale", "ev100"} & given.keys():
-            given["scale"] = camera.exposure_scale
         return given
 
     def _size(self) -> tuple[int, int]:
@@ -288,15 +296,10 @@ def render_sequence(ctx: moderngl.Context, job: Job, report: Report) -> Iterator
                     yield Frame(time, blank, None, None, Camera(), files, skipped=True)
                     continue
                 frame = renderer.frame(time)
-                if states is not None and frame.moment is not None:
-                    states.keep(time, renderer.seconds(time), frame.moment.state)
-                beside.add(
-                    time,
-                    renderer.seconds(time),
-                    frame.moment,
-                    frame.ldr,
-                    files[-1] if files else None,
-                )
+                last = files[-1] if files else None
+                beside.add(time, renderer.seconds(time), frame.moment, frame.ldr, last)
+                if states is not None:
+                    states.keep(time, renderer.known(frame))
                 if not there:
                     _write(renderer, frame, writer)
                 yield replace(frame, files=files, skipped=there)
@@ -317,7 +320,8 @@ def _by_products(renderer: Renderer) -> ByProducts:
         plot=job.plot,
         video=job.video,
         fps=playback_rate(renderer.stage.GetTimeCodesPerSecond(), renderer.times),
-        resume=job.resume or job.start.state is not None,
+        resume=job.resume or job.start.file is not None,
+        screen=viewing.screen,
     )
 
 
@@ -340,8 +344,8 @@ def _checkpoints(renderer: Renderer) -> Checkpoints | None:
         "cuts": sorted(job.cuts),
     }
     states = Checkpoints(job.states, viewing.operator.name, setup)
-    if job.resume:
-        states.load()
+    if job.resume or job.start.file is not None:
+        states.load(job.resume)
     return states
 
 
@@ -401,11 +405,11 @@ def exr_header(renderer: Renderer, frame: Frame) -> dict[str, Any]:
     if math.isfinite(frame.time):  # the default time is no number
         header["hdrusd:frame"] = float(frame.time)
     if frame.moment is not None and frame.moment.state is not None and renderer.viewing is not None:
-        seconds = renderer.seconds(frame.time)
         number = frame.time if math.isfinite(frame.time) else 0.0
-        header["hdrusd:state"] = state_text(
-            renderer.viewing.operator, number, seconds, frame.moment.state
-        )
+        known = renderer.known(frame)
+        header["hdrusd:state"] = state_text(renderer.viewing.operator, number, known)
+    if len(frame.lamps):
+        header["hdrusd:lamps"] = lamps_text(frame.lamps)
     if camera.exposure_scale is not None:
         header["hdrusd:exposureScale"] = float(camera.exposure_scale)
     return header

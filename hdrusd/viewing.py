@@ -12,6 +12,7 @@ steps in this order:
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -84,6 +85,15 @@ class Viewing:
             "glare": self.glare.name if self.glare is not None else None,
         }
 
+    def field(self, sight: Sight, size: tuple[int, int]) -> tuple[float, float]:
+        """Width and height in degrees: the camera's, else the screen's, else a usual one."""
+        if sight.field is not None:
+            return sight.field
+        if self.screen.field is None:
+            return default_field(*size)
+        half = math.tan(math.radians(self.screen.field) / 2.0)
+        return self.screen.field, math.degrees(2.0 * math.atan(half * size[1] / size[0]))
+
     def needs(self, moment: Moment) -> Need:
         """What has to be measured of a frame."""
         need = self.operator.needs(moment.parameters)
@@ -94,10 +104,11 @@ class Viewing:
 class Sight:
     """What of a frame is known beside its pixels.
 
-    ``time`` in s, ``frame`` its number; ``field``: width and height in degrees, None where the
-    camera is unknown; ``parameters`` of the operator where they are this frame's own.
+    ``time`` in s, ``frame`` its number, ``camera`` the camera's name; ``field``: width and height
+    in degrees, None where the camera is unknown; ``parameters`` of the operator where they are
+    this frame's own.
     ``lamps`` (n, 6) are outside the frame and dazzle all the same (glare/veil.py). ``rods``: the
-    frame's fourth channel is what corrects the scotopic luminance of its RGB (``with_rods``).
+    frame's fourth channel is its white-relative scotopic luminance (``with_rods``).
     """
 
     time: float = 0.0
@@ -106,6 +117,7 @@ class Sight:
     parameters: Parameters | None = None
     lamps: Array | None = None
     rods: bool = False
+    camera: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,15 +185,18 @@ class Eye:
         viewing = self.viewing
         if viewing.glare is None:
             return hdr
-        angles = sight.field or default_field(*hdr.size)
-        return self._glare.veil(hdr, angles, viewing.glare, viewing.observer, sight.lamps)
+        angles = self.viewing.field(sight, hdr.size)
+        return self._glare.veil(
+            hdr, angles, viewing.glare, viewing.observer, sight.lamps, rods=sight.rods
+        )
 
     def _adapt(self, hdr: moderngl.Texture, sight: Sight, top_first: bool) -> Moment:
         moment = self.viewing.moment(sight.parameters)
-        angles = sight.field or default_field(*hdr.size)
+        angles = self.viewing.field(sight, hdr.size)
         need = self.viewing.needs(moment)
         stats = self.measurer.measure(hdr, need, angles, top_first=top_first)
-        return self.course.advance(replace(moment, statistics=stats), sight.time, sight.frame)
+        moment = replace(moment, statistics=stats)
+        return self.course.advance(moment, sight.time, sight.frame, sight.camera)
 
 
 class ReferenceEye:
@@ -208,8 +223,8 @@ class ReferenceEye:
             sharp = acuity_blur(sharp, moment.statistics.foveal)
         rgb = sharp[..., :3]
         if viewing.night_colour:
-            share = sharp[..., 3] if sight.rods else 1.0
-            rgb = night_colour(rgb, share * white_relative(scotopic(rgb)), *NIGHT)
+            s_n = sharp[..., 3] if sight.rods else white_relative(scotopic(rgb))
+            rgb = night_colour(rgb, s_n, *NIGHT)
         picture = encode(operator.apply(rgb, moment=moment), operator, moment.screen)
         add_legend(picture, operator, moment)
         return Shown(picture, moment)
@@ -219,17 +234,17 @@ class ReferenceEye:
         if viewing.glare is None:
             return frame
         size = frame.shape[1], frame.shape[0]
-        angles = sight.field or default_field(*size)
+        angles = viewing.field(sight, size)
         plan = pyramid(viewing.glare, viewing.observer, size, angles)
-        veiled = plan.paint(frame[..., :3], sight.lamps)
-        return np.concatenate([veiled, frame[..., 3:]], axis=-1)
+        return plan.paint(frame if sight.rods else frame[..., :3], sight.lamps)
 
     def _adapt(self, frame: Array, sight: Sight) -> Moment:
         moment = self.viewing.moment(sight.parameters)
         rgb = frame[..., :3]
-        angles = sight.field or default_field(rgb.shape[1], rgb.shape[0])
+        angles = self.viewing.field(sight, (rgb.shape[1], rgb.shape[0]))
         stats = statistics(rgb, need, angles) if (need := self.viewing.needs(moment)) else None
-        return self.course.advance(replace(moment, statistics=stats), sight.time, sight.frame)
+        moment = replace(moment, statistics=stats)
+        return self.course.advance(moment, sight.time, sight.frame, sight.camera)
 
 
 def _foveal(moment: Moment) -> Foveal:
@@ -240,11 +255,18 @@ def _foveal(moment: Moment) -> Foveal:
 
 
 def with_rods(rgb: npt.ArrayLike, rods: npt.ArrayLike) -> npt.NDArray[np.float32]:
-    """A frame (h, w, 3) with what corrects its scotopic luminance to ``rods`` (h, w), cd/m2."""
-    rgb = np.asarray(rgb, np.float32)
-    guessed = scotopic(rgb)
-    share = np.divide(rods, guessed, out=np.ones_like(guessed), where=guessed > 0.0)
-    return np.concatenate([rgb, share[..., None].astype(np.float32)], axis=-1)
+    """A frame (h, w, 3) and its scotopic luminance (h, w), scotopic cd/m2, white-relative."""
+    fourth = white_relative(clean(np.asarray(rods, np.float32)))[..., None]
+    return np.concatenate([np.asarray(rgb, np.float32), fourth.astype(np.float32)], axis=-1)
+
+
+def with_exposure(viewing: Viewing, scale: float | None) -> Parameters:
+    """Parameters for a frame whose camera states its exposure, 1/(cd/m2): that, unless given."""
+    given = dict(viewing.parameters)
+    names = {parameter.name for parameter in viewing.operator.parameters}
+    if scale is not None and {"scale", "ev100"} <= names and not {"scale", "ev100"} & given.keys():
+        given["scale"] = scale
+    return given
 
 
 def reads_screen(operator: Operator, parameters: Parameters) -> bool:
@@ -284,13 +306,13 @@ def _encoded(linear: Array, screen: Screen) -> Array:
 
 
 def decoded(code: Array, screen: Screen) -> Array:
-    """Grey code values [0, 1] as display-linear light: by the EOTF, what ``encode`` did."""
+    """Code values [0, 1] as display-linear light, of a PQ screen as cd/m2 of Rec. 2020."""
     if screen.eotf == "gamma22":
         return gamma_decode(code, 2.2)
     if screen.eotf == "bt1886":
         return bt1886_decode(code, screen.black, screen.peak)
     if screen.eotf == "pq":
-        return np.clip((pq_decode(code) - screen.black) / (screen.peak - screen.black), 0.0, 1.0)
+        return pq_decode(code)
     return srgb_decode(code)
 
 

@@ -25,7 +25,8 @@ LAYERS = (
     {"eye"},
     {"glare", "photometry", "tonemap"},
     {"importers", "images"},
-    {"usd", "gpu", "adaptation_log", "contact_sheet", "course", "video"},
+    {"usd", "gpu", "adaptation_log", "contact_sheet", "course", "video"}
+    | {"frame_header", "frame_io"},
     {"job", "luminaires", "maps", "validation", "viewing"},
     {"by_products", "surfaces"},
     {"display"},

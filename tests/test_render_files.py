@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from stage_text import GROUND, SKY, write_stage
 
-from hdrusd.display import Writer
+from hdrusd.frame_io import Writer
 from hdrusd.images import read_exr, read_image, write_png
 from hdrusd.job import Job
 from hdrusd.photometry.lightcut import EPSILON
@@ -178,10 +178,11 @@ def RenderSettings "Settings" (
     )
     job = Job(stage, width=8, height=6, operator=OPERATORS["reinhard02"])
     report = Report()
-    camera = Renderer(gl, job, report).frame(0.0).camera
-    assert Renderer(gl, job, report)._parameters(OPERATORS["reinhard02"], camera)["key"] == 0.5
-    chosen = replace(job, parameters={"key": 0.2})
-    assert Renderer(gl, chosen, report)._parameters(OPERATORS["reinhard02"], camera)["key"] == 0.2
+    for given, key in ({}, 0.5), ({"key": 0.2}, 0.2):
+        renderer = Renderer(gl, replace(job, parameters=given), report)
+        moment = renderer.frame(0.0).moment
+        assert moment is not None
+        assert moment.parameters["key"] == key
     gl.extra["framebuffer"].use()
 
 

@@ -41,6 +41,7 @@ import numpy.typing as npt
 from hdrusd.colour import clean
 from hdrusd.errors import HdrusdError
 from hdrusd.eye.observer import Observer
+from hdrusd.eye.scotopic import scotopic, white_relative
 from hdrusd.glare.model import Array, GlareModel
 from hdrusd.glare.veil import LAMP, kernel, pixel_angle, plane
 
@@ -249,8 +250,12 @@ class Pyramid:
         return np.asarray(drawn[low] * (1.0 - part[..., None]) + drawn[low + 1] * part[..., None])
 
     def paint(self, picture: npt.ArrayLike, lamps: npt.ArrayLike | None = None) -> Array:
-        """The veiled picture (h, w, 3) in cd/m2, top row first; lamps as in veil.py."""
-        rgb = clean(np.asarray(picture, np.float64))[::-1]
+        """The veiled picture (h, w, 3) in cd/m2, top row first; lamps as in veil.py.
+
+        A fourth channel is white-relative scotopic luminance; of the veil's, its colour tells.
+        """
+        whole = clean(np.asarray(picture, np.float64))[::-1]
+        rgb = whole[..., :3]
         if rgb.shape[1::-1] != self.size:
             raise HdrusdError(f"picture of {rgb.shape[1]} x {rgb.shape[0]}; want {self.size}")
         rows = None if lamps is None else as_lamps(lamps)
@@ -271,7 +276,9 @@ class Pyramid:
                 weight = self._weights_at(k, source.shape[1::-1])
                 veil = veil + weight[..., :1] * source + weight[..., 1:] * _blurred(source)
         veil = _enlarged(veil, self.size, self.first, 0)
-        return np.asarray(((1.0 - veil[..., 3:]) * rgb + veil[..., :3])[::-1])
+        rods = white_relative(scotopic(veil[..., :3]))[..., None]
+        added = np.concatenate([veil[..., :3], rods], axis=-1)[..., : whole.shape[2]]
+        return np.asarray(((1.0 - veil[..., 3:]) * whole + added)[::-1])
 
 
 def as_lamps(lamps: npt.ArrayLike) -> Array:

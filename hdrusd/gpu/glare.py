@@ -59,13 +59,16 @@ class GlarePass:
         model: GlareModel,
         observer: Observer,
         lamps: npt.ArrayLike | None = None,
+        *,
+        rods: bool = False,
     ) -> moderngl.Texture:
         """The veiled picture: RGBA32F of the size of ``hdr``, valid until the next one.
 
         ``hdr``: RGB(A) float texture in cd/m2, bottom row first; NaN and negative channels
         are black, A stays as it is. ``field``: width and height of the perspective picture,
         degrees. ``lamps`` (n, 6): those that the picture does not hold (glare/veil.py); they
-        add nothing to a model without a point spread. Raises HdrusdError for a field or
+        add nothing to a model without a point spread. ``rods``: A is white-relative scotopic
+        luminance, and veiled too. Raises HdrusdError for a field or
         lamps that cannot be.
         """
         plan = pyramid(model, observer, hdr.size, field)
@@ -81,7 +84,7 @@ class GlarePass:
             if rows is not None:
                 self._splat(plan, level, rows)
             veil = self._add(plan, level, veil)
-        return self._compose(hdr, plan, veil)
+        return self._compose(hdr, plan, veil, rods)
 
     def release(self) -> None:
         """Give the textures back."""
@@ -167,12 +170,12 @@ class GlarePass:
         return self._texture(plan, "veil", level)
 
     def _compose(
-        self, hdr: moderngl.Texture, plan: Pyramid, veil: moderngl.Texture
+        self, hdr: moderngl.Texture, plan: Pyramid, veil: moderngl.Texture, rods: bool
     ) -> moderngl.Texture:
         self._draw(
             self._frame(plan, "whole", 0),
             _VEIL,
-            {"SCALE": float(1 << plan.first)},
+            {"SCALE": float(1 << plan.first)} | ({"RODS": 1} if rods else {}),
             {"hdr": (hdr, self._texels), "veil": (veil, self._between)},
             {"texel": _texel(hdr), "veil_texel": _texel(veil)},
         )

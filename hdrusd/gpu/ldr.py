@@ -58,8 +58,8 @@ class ToneMapper:
         Of ``moment.screen``: 16 bits for PQ, else 8. The texture's row 0 is the bottom one, as
         OpenGL draws it, unless ``top_first``. NaN and negative channels are black. ``moment``
         has the operator's complete parameters, and the statistics and state that it needs.
-        ``night``: shares of eye.scotopic.night_colour; with ``rods`` alpha corrects the scotopic
-        luminance of RGB.
+        ``night``: shares of eye.scotopic.night_colour; with ``rods`` alpha is the white-relative
+        scotopic luminance.
         Raises HdrusdError for these, ShaderError.
         """
         width, height = hdr.size

@@ -1,7 +1,8 @@
 """Statistics of an HDR frame on the GPU; their definition is tonemap.operator.statistics.
 
 Averages and extremes: a fragment takes in a block of pixels, NumPy adds up the blocks
-in float64. Every pixel counts once, which mipmaps of an odd size do not grant.
+in float64. Every pixel counts once, which mipmaps of an odd size do not grant. A block is a
+piece of a row: one of 16 x 8 pixels takes a fifth longer.
 
 Percentiles: the upper 16 bits of each luminance's float32 are read back and counted.
 Such a bin is 1/128 of its octave's lower end wide, so its middle is within 0.4 % of
@@ -25,7 +26,7 @@ from hdrusd.gpu.foveal import FovealSampler
 from hdrusd.gpu.program import Programs, set_uniforms
 from hdrusd.tonemap.operator import FLOOR, Need, Statistics, of_foveal, percentile_rank
 
-_COLUMNS, _ROWS = 16, 8  # pixels of a block
+_BLOCK, _RUN = 128, 16  # pixels of a block, all in one row, and of one logarithm
 _BINS = 8  # pixels of an RGBA32UI texel
 
 
@@ -85,10 +86,10 @@ class Measurer:
         target = self._draw(
             hdr,
             "gpu/shaders/measure.frag",
-            {"COLUMNS": _COLUMNS, "ROWS": _ROWS},
-            (-(-width // _COLUMNS), -(-height // _ROWS)),
+            {"BLOCK": _BLOCK, "RUN": _RUN},
+            (-(-width // _BLOCK), height),
             ((4, "f4"), (1, "f4")),
-            whole=width % _COLUMNS == 0 and height % _ROWS == 0,
+            whole=width % _BLOCK == 0,
         )
         counted = _read(target, 0, 4, "f4").reshape(-1, 4)
         logs, number = counted[:, :2].sum(axis=0, dtype=np.float64)

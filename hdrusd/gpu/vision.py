@@ -26,6 +26,9 @@ Floats = npt.NDArray[np.float32]
 
 _VERTEX, _FRAGMENT = "gpu/shaders/acuity.vert", "gpu/shaders/acuity.frag"
 
+#: Levels by which an interpolated one may be off.
+_ROUNDING = 1e-4
+
 
 class AcuityPass:
     """Blurs frames of any size; textures of the last size are kept."""
@@ -63,6 +66,8 @@ class AcuityPass:
         chain = [hdr, *self._halve(hdr, last + 1, row)]
         cells = _cells(samples if top_first else samples[::-1], hdr.size)
         least, most = cells[:, 4:8].min(axis=1), cells[:, 4:8].max(axis=1)
+        # What the rasteriser interpolates may round past a corner's level, to a level beside.
+        floor, ceiling = np.floor(least - _ROUNDING), np.floor(most + _ROUNDING)
         if not (most > 0.0).all():
             source = self.ctx.framebuffer([hdr])
             self.ctx.copy_framebuffer(self._result, source)
@@ -71,8 +76,8 @@ class AcuityPass:
         shared = {"size": hdr.size, "last": last, "density": density, "row": row}
         with self.ctx.scope(self._result, moderngl.NOTHING):
             for number in range(last + 1):
-                below = number == 0 or np.minimum(np.floor(most), last) >= number
-                chosen = (most > 0.0) & below & (np.minimum(np.floor(least), last) <= number)
+                below = number == 0 or np.minimum(ceiling, last) >= number
+                chosen = (most > 0.0) & below & (np.minimum(floor, last) <= number)
                 self._draw(cells[chosen], number, chain[number : number + 2], shared)
         return _texture(self._result)
 

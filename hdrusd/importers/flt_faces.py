@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from hdrusd.importers.flt_palettes import Palettes
 from hdrusd.importers.flt_records import (
@@ -20,6 +19,7 @@ from hdrusd.importers.flt_records import (
     MORPH_LIST,
     VERTEX_LIST,
     Document,
+    Grouped,
     Integers,
 )
 from hdrusd.importers.flt_vertices import (
@@ -172,25 +172,24 @@ def _with_meshes(document: Document, palettes: Palettes, faces: Faces, made: Pol
     meshes = np.flatnonzero(document.records.op[faces.record] == MESH)
     if not len(meshes):
         return made
-    primitives = document.records.of(MESH_PRIMITIVE)
-    of_mesh = document.records.parent[primitives]
+    parts = document.records.of(MESH_PRIMITIVE)
+    primitives = Grouped(document.records.parent[parts], parts)
     stores = document.records.of(MESH_VERTICES)
     # A pool follows its mesh on the same level, or is its first child.
     own = document.records.before(faces.record[meshes], stores)
-    own = np.where(own >= 0, own, document.records.parent[stores])
+    pools_of = Grouped(np.where(own >= 0, own, document.records.parent[stores]), stores)
     total = len(made.vertices.position)
     for row in meshes.tolist():
         record = int(faces.record[row])
         name = document.text(record, 4, 8)
-        store = stores[own == record].tolist()
-        parts = primitives[of_mesh == record].tolist()
-        if not store or not parts:
+        store, own_parts = pools_of[record].tolist(), primitives[record].tolist()
+        if not store or not own_parts:
             text = "mesh without vertices" if not store else "mesh without primitives"
             document.add(Kind.DROPPED, "flt-no-faces", record, name, f"{text}; left out")
             continue
         pool, good = pool_vertices(document, palettes, store[0], name)
         rows_of = np.where(good, np.arange(len(good)) + total, -1)
-        for part in parts:
+        for part in own_parts:
             corners, counts = _primitive(document, part, name, rows_of)
             face.append(np.full(len(counts), row, np.int64))
             count.append(counts)

@@ -101,6 +101,19 @@ class Records:
         return np.where(fits, found, -1)
 
 
+class Grouped:
+    """Values by their keys: finds those of one key without looking at the others."""
+
+    def __init__(self, keys: Integers, values: Integers) -> None:
+        order = np.argsort(keys, kind="stable")
+        self.keys, self.values = keys[order], values[order]
+
+    def __getitem__(self, key: int) -> Integers:
+        """The values of a key, in their order; none where it has none."""
+        low, high = np.searchsorted(self.keys, [key, key + 1])
+        return self.values[low:high]
+
+
 @dataclass(slots=True)
 class Document:
     """One file. ``data`` ends with ``PADDING`` zeros, so that no array reads past it."""

@@ -209,17 +209,17 @@ def pool_vertices(
     if not count:
         return made, np.zeros(0, np.bool_)
     table = body[12 : 12 + count * stride].reshape(count, stride)
-    made.position[:] = numbers(table, at["position"], ">f8", 3)
+    made.position[:] = floats(table, at["position"], ">f8", 3)
     if "index" in at:  # its first byte is an opacity
-        index = numbers(table, at["index"], ">u4").ravel().astype(np.int64) & 0xFFFFFF
+        index = whole(table, at["index"], ">u4") & 0xFFFFFF
         made.color[:] = palettes.color(index)
     if "packed" in at:
         made.color[:] = unpacked(table[:, at["packed"] : at["packed"] + 4])
     made.has_color[:] = "index" in at or "packed" in at
     if "normal" in at:
-        made.normal[:] = numbers(table, at["normal"], ">f4", 3)
+        made.normal[:] = floats(table, at["normal"], ">f4", 3)
         made.has_normal[:] = True
     if "uv" in at:
-        made.uv[:] = numbers(table, at["uv"], ">f4", 2)
+        made.uv[:] = floats(table, at["uv"], ">f4", 2)
         made.has_uv[:] = True
     return made, made.usable()

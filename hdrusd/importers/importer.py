@@ -142,12 +142,20 @@ class Importer(Protocol):
 
 #: Name of the format to its reader.
 IMPORTERS: Registry[Importer] = Registry("importer", "hdrusd.importers")
+IMPORTERS.add("flt", "hdrusd.importers.flt:read")
 IMPORTERS.add("gltf", "hdrusd.importers.gltf:read")
 IMPORTERS.add("obj", "hdrusd.importers.obj:read")
 IMPORTERS.add("osg", "hdrusd.importers.osg:read")
 
 #: File suffix (lower case) to the name of its format.
-SUFFIXES = {".gltf": "gltf", ".glb": "gltf", ".obj": "obj", ".osg": "osg", ".osgt": "osg"}
+SUFFIXES = {
+    ".flt": "flt",
+    ".gltf": "gltf",
+    ".glb": "gltf",
+    ".obj": "obj",
+    ".osg": "osg",
+    ".osgt": "osg",
+}
 
 
 def read(resolver: Resolver, report: Report) -> LegacyScene:

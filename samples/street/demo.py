@@ -122,8 +122,8 @@ def halve(picture: np.ndarray) -> np.ndarray:
 
 
 def moment(frame: int) -> str:
-    """Name of a row: 0 s is the first frame."""
-    return f"{(frame - FRAMES[0]) / TIME_CODES:.2f} s"
+    """Name of a row: seconds of the drive."""
+    return f"{frame / TIME_CODES:.2f} s"
 
 
 def write_video(out: Path) -> Path | None:

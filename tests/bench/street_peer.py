@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from hdrusd.display import Writer
+from hdrusd.frame_io import Writer
 from hdrusd.gpu.context import create_context, describe
 from hdrusd.images import write_exr
 from hdrusd.job import Job

@@ -17,6 +17,7 @@ what that alone costs. Processor time is that of all threads.
 from __future__ import annotations
 
 import json
+import os
 import resource
 import shutil
 import statistics
@@ -49,7 +50,7 @@ from tests.bench.__main__ import ROOT, machine
 
 SIZE, FRAMES_SIZE = (1920, 1080), (1280, 720)
 FIELD = (60.0, 36.0)  # degrees
-REC709 = "0.640 0.330 0.300 0.600 0.150 0.060 0.3127 0.3290".split()
+REC709 = ["0.640", "0.330", "0.300", "0.600", "0.150", "0.060", "0.3127", "0.3290"]
 
 REINHARD, IRAWAN = "hdrusd reinhard02", "hdrusd irawan05"
 OPENCV, PCOND = "OpenCV TonemapReinhard", "pcond -h"
@@ -101,8 +102,15 @@ def inside(work: Callable[[], object]) -> Callable[[], tuple[float, float]]:
     return once
 
 
-def command(*words: str | Path, source: Path | None = None) -> Callable[[], tuple[float, float]]:
-    """Seconds of a process, its start included, that writes to nowhere."""
+def command(
+    *words: str | Path, source: Path | None = None, path: Path | None = None
+) -> Callable[[], tuple[float, float]]:
+    """Seconds of a process, its start included, that writes to nowhere.
+
+    ``source``: what it is given as its input; ``path``: where it finds others of its kind.
+    """
+    places = os.environ.get("PATH", "")
+    environment = {**os.environ, "PATH": places if path is None else f"{path}:{places}"}
 
     def once() -> tuple[float, float]:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -113,6 +121,7 @@ def command(*words: str | Path, source: Path | None = None) -> Callable[[], tupl
                 stdin=given,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
+                env=environment,
                 check=True,
             )
         wall = time.perf_counter() - wall
@@ -191,16 +200,20 @@ def opencv_row(python: Path, picture: np.ndarray, folder: Path) -> tuple[Row, st
 def radiance_rows(binaries: Path, picture: np.ndarray, folder: Path) -> list[Row]:
     """Radiance's pcond, and its plain reader and writer of the same file."""
     source = folder / "picture.hdr"
-    out = oiio.ImageOutput.create(str(source))
-    out.open(str(source), oiio.ImageSpec(picture.shape[1], picture.shape[0], 3, oiio.FLOAT))
+    spec = oiio.ImageSpec(picture.shape[1], picture.shape[0], 3, oiio.FLOAT)
+    out: Any = oiio.ImageOutput.create(str(source))
+    out.open(str(source), spec)
     out.write_image(picture)
     out.close()
     display = ["-u", "100", "-d", "100", "-p", *REC709]
-    pcond: Path = binaries / "pcond"
+
+    def run(*words: str) -> Callable[[], tuple[float, float]]:
+        return command(binaries / words[0], *words[1:], source, path=binaries)
+
     return [
-        Row(PCOND, command(pcond, "-h", *display, source), f"pcond -h {' '.join(display)}"),
-        Row("pcond", command(pcond, *display, source), "histogram adjustment alone"),
-        Row("ra_rgbe -r", command(binaries / "ra_rgbe", "-r", source), "reading, writing alone"),
+        Row(PCOND, run("pcond", "-h", *display), f"file to file, {' '.join(display)}"),
+        Row("pcond", run("pcond", *display), "histogram adjustment alone"),
+        Row("ra_rgbe -r", run("ra_rgbe", "-r"), "reading and writing that file alone"),
     ]
 
 
@@ -237,8 +250,8 @@ def peer_rows(peers: Path, picture: np.ndarray, folder: Path) -> tuple[list[Row]
     if found or system is not None:
         pcond = found[0] if found else Path(system or "")
         rows += radiance_rows(pcond.parent, picture, folder)
-        told = sorted(pcond.parents[2].glob("pyradiance-*.dist-info"))
-        versions.append(told[0].stem if told else str(pcond))
+        packages = sorted(pcond.parents[2].glob("pyradiance-*.dist-info"))
+        versions.append(packages[0].stem if packages else str(pcond))
     if shutil.which("pfstmo_reinhard02") and shutil.which("pfsinexr"):
         rows += pfs_rows(picture, folder)
         told = subprocess.run(["pfstmo_reinhard02", "--help"], capture_output=True, text=True)

@@ -16,6 +16,9 @@ import numpy as np
 import pytest
 from command_line import CommandLine
 
+from hdrusd.by_products import screen_luminance
+from hdrusd.colour import luminance, pq_encode, to_rec2020
+from hdrusd.eye.screen import Screen
 from hdrusd.images import read_exr, read_exr_header, read_image, write_exr
 
 FRAMES = 60
@@ -85,6 +88,20 @@ def test_a_split_sequence_is_the_whole_one(
     assert tables[0] == tables[1]
 
 
+def test_two_halves_in_one_folder_are_one_sequence(
+    hdrusd: CommandLine, night: str, tmp_path: Path
+) -> None:
+    """The second half goes on in the first one's file, so that the whole can be resumed."""
+    to = ["tonemap", night, tmp_path / "p.####.png", "-op", "irawan05"]
+    hdrusd.run(*to, "-f", "1:25")
+    hdrusd.run(*to, "-f", "26:60", "--state-in", tmp_path / "p.eye.json")
+    wanted = pictures(tmp_path)
+    for frame in (5, 40):
+        (tmp_path / f"p.{frame:04}.png").unlink()
+    hdrusd.run(*to, "--resume")
+    assert pictures(tmp_path) == wanted
+
+
 def test_killed(night: str, tmp_path: Path, gl: Any, hdrusd: CommandLine) -> None:
     """Kill -9 in the middle; the rest is made by --resume."""
     whole, killed = tmp_path / "whole", tmp_path / "killed"
@@ -100,8 +117,10 @@ def test_killed(night: str, tmp_path: Path, gl: Any, hdrusd: CommandLine) -> Non
         time.sleep(0.002)
     job.send_signal(signal.SIGKILL)
     job.wait()
+    assert 0 < len(pictures(killed)) < FRAMES
     hdrusd.run("tonemap", night, killed / "p.####.png", "-op", "irawan05", "--resume")
     assert pictures(killed) == pictures(whole)
+    assert (killed / "p.eye.csv").read_text() == (whole / "p.eye.csv").read_text()
 
 
 def test_states_of_other_settings_are_refused(
@@ -233,6 +252,7 @@ REFUSED = [
     (["--state-in", "junk.json"], 3, "junk.json: not JSON"),
     (["--state-in", "deep.json"], 3, "deep.json: not JSON"),
     (["--state-in", "other.json"], 3, "other.json: state of pattanaik00; want one of irawan05"),
+    (["--state-in", "long.json"], 3, "long.json: states; want frame, time and state"),
     (["--state-in", "empty.json"], 2, "irawan05: state: not an eye"),
     (["--warm-up", "3"], 2, "--warm-up: want --adapt-from"),
     (["--observer", "age=tall"], 2, "age"),
@@ -251,6 +271,13 @@ def test_refusals(
         "deep.json": "[" * 100_000,
         "other.json": json.dumps(
             {"format": "hdrusd-eye/1", "operator": "pattanaik00", "states": [state]}
+        ),
+        "long.json": json.dumps(
+            {
+                "format": "hdrusd-eye/1",
+                "operator": "irawan05",
+                "states": [{**state, "state": {"cone": [10**400]}}],
+            }
         ),
         "empty.json": json.dumps(
             {"format": "hdrusd-eye/1", "operator": "irawan05", "states": [state]}
@@ -278,4 +305,138 @@ def test_exr_frames_hold_the_state(hdrusd: CommandLine, night: str, tmp_path: Pa
         *["--state-in", tmp_path / "a.exr"],
     )
     assert state["state"]
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_infinite_settings_are_kept(hdrusd: CommandLine, night: str, tmp_path: Path) -> None:
+    """JSON has no infinity, and white=inf is a setting that the paper has."""
+    to = ["tonemap", night, tmp_path / "p.####.png", "--set", "white=inf", "-f", "1:3"]
+    hdrusd.run(*to)
+    (tmp_path / "p.0002.png").unlink()
+    said = json.loads(hdrusd.run(*to, "--resume", "--json").out)
+    assert said["skipped"] == 2
+
+
+def test_pq_sequences(hdrusd: CommandLine, night: str, tmp_path: Path) -> None:
+    """16 bits: resumed and measured like 8; but no video of BT.709 is made of them."""
+    to = ["tonemap", night, tmp_path / "p.####.png", "-op", "irawan05", "--screen", "hdr"]
+    hdrusd.run(*to, "-f", "1:4")
+    table = (tmp_path / "p.eye.csv").read_text()
+    (tmp_path / "p.0003.png").unlink()
+    hdrusd.run(*to, "-f", "1:4", "--resume")
+    assert (tmp_path / "p.eye.csv").read_text() == table
+    assert "PQ" in hdrusd.refused(*to, "--video", tmp_path / "p.mp4", code=2)
+
+
+def test_mean_luminance_of_screens() -> None:
+    """Patches of one colour whose cd/m2 the screen is told."""
+    for name, rgb in (("red", [4.0, 0.0, 0.0]), ("blue", [0.0, 0.0, 20.0]), ("grey", [3.0] * 3)):
+        light = np.broadcast_to(np.array(rgb), (8, 8, 3))
+        screen = Screen(eotf="pq", peak=1000.0, black=0.0, ambient=10.0, reflectance=0.1)
+        code = (pq_encode(np.maximum(to_rec2020(light), 0.0)) * 65535.0 + 0.5).astype(np.uint16)
+        wanted = float(luminance(np.array(rgb))) + 1.0 / np.pi
+        assert screen_luminance(code, screen) == pytest.approx(wanted, rel=2e-3), name
+    white = np.full((4, 4, 3), 255, np.uint8)
+    assert screen_luminance(white, Screen()) == pytest.approx(100.0)
+    assert screen_luminance(0 * white, Screen()) == pytest.approx(1.0)
+
+
+def test_a_screen_s_field_is_for_frames_without_a_camera(
+    hdrusd: CommandLine, tmp_path: Path, gl: Any
+) -> None:
+    """What the frame's camera says goes before; ``render`` and ``tonemap`` agree."""
+    from stage_text import GROUND, SKY, panel, write_stage
+
+    stage = write_stage(tmp_path / "a.usda", GROUND, panel("P", color=(0.2, 1, 0.1)), SKY)
+    to = ["-op", "irawan05", "--screen", "headset", "--glare", "cie135"]
+    hdrusd.run("render", stage, tmp_path / "a.exr", "--png", tmp_path / "a.png", "-w", "64", *to)
+    hdrusd.run("tonemap", tmp_path / "a.exr", tmp_path / "b.png", *to)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+LAMP_BESIDE = """
+def SphereLight "Beside" {
+    double3 xformOp:translate = (9, 1, 0)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+    bool treatAsPoint = 1
+    float inputs:radius = 0.1
+    float inputs:intensity = 300000
+}
+"""
+
+
+def test_lamps_beside_the_frame_are_in_its_header(
+    hdrusd: CommandLine, tmp_path: Path, gl: Any
+) -> None:
+    """So that they dazzle in the second pass as they did in the first."""
+    from stage_text import GROUND, write_stage
+
+    stage = write_stage(tmp_path / "a.usda", GROUND, LAMP_BESIDE)
+    to = ["-op", "exposure", "--set", "scale=0.5", "--glare", "cie135"]
+    hdrusd.run("render", stage, tmp_path / "a.exr", "--png", tmp_path / "a.png", "-w", "64", *to)
+    assert len(json.loads(read_exr_header(tmp_path / "a.exr")["hdrusd:lamps"])) == 1
+    hdrusd.run("tonemap", tmp_path / "a.exr", tmp_path / "b.png", *to)
+    hdrusd.run("tonemap", tmp_path / "a.exr", tmp_path / "none.png", *to[:4])
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert (tmp_path / "a.png").read_bytes() != (tmp_path / "none.png").read_bytes()
+
+
+ODD = {
+    "hdrusd:camera": np.arange(9.0, dtype=np.float32),
+    "hdrusd:frame": "first",
+    "hdrusd:timeCodesPerSecond": -1.0,
+    "hdrusd:lamps": "[[1, 2, 3]]",
+    "hdrusd:exposureScale": "bright",
+    "worldToCamera": "nowhere",
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_odd_headers(hdrusd: CommandLine, night: str, tmp_path: Path, name: str) -> None:
+    """What makes no sense is as if it were not there."""
+    rgb, _ = read_exr(Path(night.replace("####", "0005")))
+    write_exr(tmp_path / "plain.exr", rgb)
+    write_exr(tmp_path / "odd.exr", rgb, {name: ODD[name]})
+    for file in ("plain", "odd"):
+        to = ["-op", "irawan05", "--glare", "cie135"]
+        hdrusd.run("tonemap", tmp_path / f"{file}.exr", tmp_path / f"{file}.png", *to)
+    assert (tmp_path / "odd.png").read_bytes() == (tmp_path / "plain.png").read_bytes()
+
+
+def test_broken_scotopic_layer(hdrusd: CommandLine, tmp_path: Path) -> None:
+    """No light where it is not a number, on the GPU and in NumPy."""
+    rgb = np.full((8, 8, 3), 0.01, np.float32)
+    rods = np.full((8, 8), 0.02, np.float32)
+    rods[2, 2], rods[3, 3], rods[4, 4] = np.nan, -1.0, np.inf
+    write_exr(tmp_path / "a.exr", rgb, layers={"scotopic.Y": rods})
+    to = ["--night-vision", "colour", "-op", "exposure", "--set", "scale=20"]
+    for name, options in (("gpu", []), ("cpu", ["--reference"])):
+        hdrusd.run("tonemap", tmp_path / "a.exr", tmp_path / f"{name}.png", *to, *options)
+    gpu, cpu = (read_image(tmp_path / f"{n}.png").pixels.astype(int) for n in ("gpu", "cpu"))
+    assert np.abs(gpu - cpu).max() <= 1
+    assert gpu[2, 2].max() < gpu[0, 0].max()
+    assert gpu[4, 4].min() == 255
+
+
+@pytest.mark.parametrize(
+    "option", [["--night-vision", "all"], ["--cut", "reset"], ["--glare", "cie135"], ["--plot"]]
+)
+def test_options_of_pictures_want_a_picture(
+    hdrusd: CommandLine, tmp_path: Path, option: list[str]
+) -> None:
+    from stage_text import GROUND, SKY, write_stage
+
+    stage = write_stage(tmp_path / "a.usda", GROUND, SKY)
+    said = hdrusd.refused("render", stage, tmp_path / "a.exr", *option, code=2)
+    assert f"{option[0]}: nothing is tone mapped" in said
+
+
+def test_the_camera_s_exposure_goes_with_the_frame(
+    hdrusd: CommandLine, night: str, tmp_path: Path
+) -> None:
+    rgb, _ = read_exr(Path(night.replace("####", "0005")))
+    write_exr(tmp_path / "a.exr", rgb, {"hdrusd:exposureScale": 0.25})
+    hdrusd.run("tonemap", tmp_path / "a.exr", tmp_path / "a.png", "-op", "exposure")
+    to = ["-op", "exposure", "--set", "scale=0.25"]
+    hdrusd.run("tonemap", tmp_path / "a.exr", tmp_path / "b.png", *to)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()

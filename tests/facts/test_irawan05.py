@@ -94,6 +94,7 @@ def test_display_after_a_step(before: float, now: float) -> None:
         np.testing.assert_allclose(course(before, now, t).display(scene), display, rtol=6e-4)
 
 
+# The vectors' weight of rods and cones takes S = 2.26 Y, as ``stepped`` does.
 @pytest.mark.parametrize(("before", "now"), COURSES)
 def test_equivalent_luminance(before: float, now: float) -> None:
     for t, wanted in zip(TIMES, EQUIVALENT[before, now], strict=True):

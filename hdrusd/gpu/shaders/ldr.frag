@@ -5,10 +5,10 @@
 
 layout(location = 0) out uvec4 bytes;
 
-// The pixel x to the right and y down: red in the lowest byte, then green and blue.
-uint pixel(ivec2 p)
+// What the screen is told: red in the lowest byte, then green and blue.
+uint bytes_of(vec3 linear, ivec2 p)
 {
-    uvec3 code = quantise(shown(p), dither(uint(p.x), uint(p.y)));
+    uvec3 code = quantise(ENCODE(linear), dither(uint(p.x), uint(p.y)));
     return code.r | code.g << 8 | code.b << 16;
 }
 
@@ -18,14 +18,20 @@ void main()
     ivec2 at = ivec2(gl_FragCoord.xy);
     int skip = at.x % 3;
     ivec2 p = ivec2(at.x / 3 * 16 + skip * 5, at.y);
-    uint a = pixel(p);
-    uint b = pixel(p + ivec2(1, 0));
-    uint c = pixel(p + ivec2(2, 0));
-    uint d = pixel(p + ivec2(3, 0));
-    uint e = pixel(p + ivec2(4, 0));
-    uint f = pixel(p + ivec2(5, 0));
-    uvec4 words = uvec4(a | b << 24, b >> 8 | c << 16, c >> 16 | d << 8, e | f << 24);
-    uvec4 next = uvec4(words.yzw, f >> 8);
+    // Step by step for all six, not pixel by pixel: a step is a chain in which each instruction
+    // waits for the one before, and a processor looks ahead for others no further than a step.
+    // That is a fifth of the time.
+    vec3 rgb[6];
+    uint code[6];
+    for (int i = 0; i < 6; ++i)
+        rgb[i] = light(p + ivec2(i, 0));
+    for (int i = 0; i < 6; ++i)
+        rgb[i] = mapped(rgb[i], p + ivec2(i, 0));
+    for (int i = 0; i < 6; ++i)
+        code[i] = bytes_of(rgb[i], p + ivec2(i, 0));
+    uvec4 words = uvec4(code[0] | code[1] << 24, code[1] >> 8 | code[2] << 16,
+                        code[2] >> 16 | code[3] << 8, code[4] | code[5] << 24);
+    uvec4 next = uvec4(words.yzw, code[5] >> 8);
     uint shift = uint(skip * 8);
     bytes = skip == 0 ? words : words >> shift | next << (32u - shift);
 }

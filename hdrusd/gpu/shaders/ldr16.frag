@@ -5,5 +5,6 @@ layout(location = 0) out uvec4 code;
 
 void main()
 {
-    code = uvec4(shown(ivec2(gl_FragCoord.xy)) * 65535.0 + 0.5, 65535.0);
+    ivec2 p = ivec2(gl_FragCoord.xy);
+    code = uvec4(ENCODE(mapped(light(p), p)) * 65535.0 + 0.5, 65535.0);
 }

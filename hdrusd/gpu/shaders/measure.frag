@@ -1,4 +1,4 @@
-// Sums and extremes of the luminance of a block of COLUMNS x ROWS pixels; see gpu/measure.py.
+// Sums and extremes of the luminance of BLOCK pixels in a row; see gpu/measure.py.
 #include "colour.glsl"
 
 uniform sampler2D hdr;  // cd/m2, nearest, black outside
@@ -10,16 +10,16 @@ layout(location = 1) out float total;  // sum over all pixels, cd/m2
 
 void main()
 {
-    ivec2 corner = ivec2(gl_FragCoord.xy) * ivec2(COLUMNS, ROWS);
-    // log2 from exponents and the product of mantissas: one logarithm a row, COLUMNS <= 16
-    // numbers below 2 at a time, in place of one a pixel. A pixel that does not count is 1.
+    float begin = floor(gl_FragCoord.x) * float(BLOCK) + 0.5;
+    // log2 from exponents and the product of mantissas: one logarithm for RUN <= 16 numbers
+    // below 2 at a time, in place of one a pixel. A pixel that does not count is 1.
     int exponents = 0;
     float logs = 0.0, number = 0.0, smallest = 1e38, largest = 0.0;
     total = 0.0;
-    for (int row = 0; row < ROWS; ++row) {
+    for (int run = 0; run < BLOCK; run += RUN) {
         float mantissas = 1.0;
-        for (int column = 0; column < COLUMNS; ++column) {
-            vec2 place = (vec2(corner + ivec2(column, row)) + 0.5) * texel;
+        for (int i = run; i < run + RUN; ++i) {
+            vec2 place = vec2(begin + float(i), gl_FragCoord.y) * texel;
             float y = luminance(clean(textureLod(hdr, place, 0.0).rgb));
             bool counts = y > FLOOR;
             int bits = floatBitsToInt(counts ? y : 1.0);

@@ -1,4 +1,4 @@
-// Shader 2 for one pixel: what the screen is told, from cd/m2, by any operator.
+// Shader 2 for one pixel in three steps: its light, the operator, and ENCODE for the screen.
 #include "colour.glsl"
 #include "eye/scotopic.glsl"
 #include OPERATOR_GLSL
@@ -21,17 +21,29 @@ vec3 encode_pq(vec3 linear)
 }
 vec3 encode_none(vec3 code) { return code; }
 
-// Code values [0, 1] of the pixel x to the right and y down.
-vec3 shown(ivec2 p)
+// Where the pixel x to the right and y down is in hdr.
+vec2 place_of(ivec2 p)
 {
     // By coordinates: a texel fetch is checked against the size, which costs a fifth on llvmpipe.
-    vec2 place = (vec2(p.x, top_row + row_step * p.y) + 0.5) * texel;
-    vec4 frame = textureLod(hdr, place, 0.0);
+    return (vec2(p.x, top_row + row_step * p.y) + 0.5) * texel;
+}
+
+// cd/m2 of that pixel, as the eye has them.
+vec3 light(ivec2 p)
+{
+    vec4 frame = textureLod(hdr, place_of(p), 0.0);
     vec3 rgb = clean(frame.rgb);
-#ifdef NIGHT  // 1: alpha corrects the scotopic luminance of RGB
-    rgb = night_colour(rgb, white_relative(scotopic(rgb)) * (NIGHT == 1 ? frame.a : 1.0));
+#ifdef NIGHT  // 1: alpha is the white-relative scotopic luminance
+    rgb = night_colour(rgb, NIGHT == 1 ? max(frame.a, 0.0) : white_relative(scotopic(rgb)));
 #endif
+    return rgb;
+}
+
+// Display-linear [0, 1] of that pixel, whose light is rgb.
+vec3 mapped(vec3 rgb, ivec2 p)
+{
 #ifdef BLURS
+    vec2 place = place_of(p);
     vec4 blurs[4] = vec4[4](
         textureLod(around_0, place, 0.0),
         BLURS > 4 ? textureLod(around_1, place, 0.0) : vec4(0.0),
@@ -40,9 +52,8 @@ vec3 shown(ivec2 p)
     float around[BLURS];
     for (int i = 0; i < BLURS; ++i)
         around[i] = blurs[i / 4][i % 4];
-    rgb = OPERATOR(rgb, around);
+    return OPERATOR(rgb, around);
 #else
-    rgb = OPERATOR(rgb);
+    return OPERATOR(rgb);
 #endif
-    return ENCODE(rgb);
 }

@@ -1,0 +1,153 @@
+"""What the header of an EXR frame says for an eye: rate, field of view, camera, lamps beside it.
+
+Headers come from anywhere: what makes no sense is as if it were not there.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hdrusd.errors import SourceRef
+from hdrusd.images import REC709
+from hdrusd.report import Kind, Report
+
+#: Frames a second where neither the user nor the file says (UsdStage's default).
+DEFAULT_FPS = 24.0
+
+#: Lamps beside the frame that a header names at most, the most dazzling first.
+MOST_LAMPS = 128
+
+#: Text of lamps that is read at most.
+_LONGEST = 1 << 16
+
+
+class Clock:
+    """Seconds of frames by their numbers and the rate that the first of them states."""
+
+    def __init__(self, fps: float | None, report: Report) -> None:
+        self.fps = fps
+        self.report = report
+
+    def time(self, number: float, source: Path, header: Mapping[str, Any]) -> float:
+        """When frame ``number`` is, in s. A rate that has to be assumed is a finding."""
+        if self.fps is None:
+            self.fps = rate_of(header)
+            if self.fps is None:
+                self.fps = DEFAULT_FPS
+                text = f"no rate; {DEFAULT_FPS:g} frames a second are assumed, see --fps"
+                self.report.add(Kind.ASSUMED, "exr-rate", SourceRef(source), "", text)
+        return number / self.fps
+
+
+def number_of(header: Mapping[str, Any]) -> float:
+    """The frame's number; 0 where it states none."""
+    number = header.get("hdrusd:frame")
+    return float(number) if isinstance(number, (int, float)) and math.isfinite(number) else 0.0
+
+
+def rate_of(header: Mapping[str, Any]) -> float | None:
+    """Frames a second that an EXR states: ours, or OpenEXR's ratio; None where it states none."""
+    said: Any = header.get("hdrusd:timeCodesPerSecond", header.get("framesPerSecond"))
+    try:
+        rate = float(said)
+    except (TypeError, ValueError):
+        try:
+            rate = float(said.n) / float(said.d)
+        except (AttributeError, TypeError, ValueError, ZeroDivisionError):
+            return None
+    return rate if math.isfinite(rate) and rate > 0.0 else None
+
+
+def field_of(
+    header: Mapping[str, Any], width: int, height: int, across: float | None = None
+) -> tuple[float, float] | None:
+    """Width and height in degrees of an EXR frame by its camera's matrices, which it may state.
+
+    ``across``: the width in degrees, which is believed before them. None where neither is known,
+    and for an orthographic camera.
+    """
+    if across is not None:
+        half = math.tan(math.radians(across) / 2.0)
+        return across, math.degrees(2.0 * math.atan(half * height / width))
+    try:
+        view = np.asarray(header["worldToCamera"], np.float64).reshape(4, 4)
+        ndc = np.asarray(header["worldToNDC"], np.float64).reshape(4, 4)
+        projection = np.linalg.inv(view) @ ndc
+    except (KeyError, ValueError, TypeError, np.linalg.LinAlgError):
+        return None
+    if not np.isfinite(projection).all() or abs(projection[2, 3]) < 1e-3:
+        return None
+    scale = abs(projection[0, 0] / projection[2, 3]), abs(projection[1, 1] / projection[2, 3])
+    if min(scale) < 1e-3:
+        return None
+    return (
+        math.degrees(2.0 * math.atan(1.0 / scale[0])),
+        math.degrees(2.0 * math.atan(1.0 / scale[1])),
+    )
+
+
+def camera_of(header: Mapping[str, Any]) -> str | None:
+    """The name of the camera."""
+    camera = header.get("hdrusd:camera")
+    return camera if isinstance(camera, str) else None
+
+
+def exposure_of(header: Mapping[str, Any]) -> float | None:
+    """The linear scale of the camera's exposure, 1/(cd/m2)."""
+    scale = header.get("hdrusd:exposureScale")
+    if isinstance(scale, (int, float)) and 0.0 < scale < math.inf:
+        return float(scale)
+    return None
+
+
+def most_dazzling(lamps: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Of lamps (n, 6) beside the frame (glare/veil.py) what a header holds, in float32.
+
+    The MOST_LAMPS with the most lux by the square of their angle from the line of sight.
+    """
+    rows = np.asarray(lamps, np.float32).astype(np.float64).reshape(-1, 6)
+    angle = np.arccos(np.clip(-rows[:, 2], -1.0, 1.0))
+    weight = rows[:, 3:].max(axis=1, initial=0.0) / np.maximum(angle, 0.01) ** 2
+    kept = np.argsort(-weight, kind="stable")[:MOST_LAMPS]
+    return np.asarray(rows[np.sort(kept)])
+
+
+def lamps_text(lamps: npt.NDArray[np.float64]) -> str:
+    """``most_dazzling`` lamps as ``hdrusd:lamps`` says them; nine digits keep a float32."""
+    return json.dumps([[float(f"{value:.9g}") for value in row] for row in lamps])
+
+
+def lamps_of(header: Mapping[str, Any]) -> npt.NDArray[np.float64] | None:
+    """The lamps beside the frame; None where it states none."""
+    text = header.get("hdrusd:lamps")
+    if not isinstance(text, str) or len(text) > _LONGEST:
+        return None
+    try:
+        rows = np.array(json.loads(text), np.float32).astype(np.float64).reshape(-1, 6)
+    except (ValueError, TypeError, OverflowError, RecursionError):
+        return None
+    length = np.linalg.norm(rows[:, :3], axis=1)
+    sound = (
+        np.isfinite(rows).all(axis=1) & (np.abs(length - 1.0) < 1e-3) & (rows >= -1.0).all(axis=1)
+    )
+    return np.asarray(rows[sound & (rows[:, 3:] >= 0.0).all(axis=1)])
+
+
+def note_units(source: Path, header: Mapping[str, Any], report: Report) -> None:
+    """Findings for a frame that is not known to be Rec. 709 in cd/m2."""
+    place = SourceRef(source)
+    if "whiteLuminance" not in header:
+        text = "no whiteLuminance; 1.0 is taken as 1 cd/m2"
+        report.add(Kind.ASSUMED, "exr-unit", place, "", text)
+    primaries = header.get("chromaticities")
+    # OpenEXR's default without the attribute is Rec. 709; 1e-3: headers with rounded values.
+    if primaries is not None and not np.allclose(np.ravel(primaries), REC709, rtol=0, atol=1e-3):
+        text = f"chromaticities {np.ravel(primaries).round(4).tolist()} are read as Rec. 709"
+        report.add(Kind.REPLACED, "exr-primaries", place, "", text)
