@@ -34,6 +34,9 @@ _PIXELS_A_BYTE = 10_000
 #: The last chunk's name and checksum (PNG, ISO/IEC 15948, 11.2.5).
 _PNG_END = b"IEND\xaeB`\x82"
 
+#: libpng's PNG_FILTER_SUB: each byte less that of the pixel to the left.
+_PNG_SUB = 16
+
 #: Lossless compressions: zip for every reader; htj2k for small files soon, which readers
 #: before OpenEXR 3.4 do not know.
 Compression = Literal["zip", "piz", "htj2k", "none"]
@@ -76,7 +79,7 @@ def _decode(real: Path, named: Path) -> ImageData:
         raise InputError(named, f"not a readable image ({_first_line(oiio.geterror())})")
     try:
         spec = picture.spec()
-        _check_size(named, spec.width, spec.height, real.stat().st_size)
+        check_size(named, spec.width, spec.height, real.stat().st_size)
         kind = {"uint8": oiio.UINT8, "half": oiio.HALF}.get(str(spec.format), oiio.FLOAT)
         channels = min(spec.nchannels, 4)
         pixels = picture.read_image(0, 0, 0, channels, kind)
@@ -88,7 +91,7 @@ def _decode(real: Path, named: Path) -> ImageData:
         picture.close()
 
 
-def _check_size(named: Path, width: int, height: int, size: int) -> None:
+def check_size(named: Path, width: int, height: int, size: int) -> None:
     """Refuse a declared size that is absurd, or more than ``size`` bytes of file can hold."""
     if not (width >= 1 and height >= 1 and width * height <= MAX_PIXELS):
         raise InputError(named, f"{width} x {height} pixels; want 1 to {MAX_PIXELS}")
@@ -190,7 +193,7 @@ def read_exr_layers(
         with OpenEXR.File(str(path), header_only=True) as file:
             low, high = (np.asarray(v, np.int64) for v in file.header()["dataWindow"])
         width, height = (int(v) for v in high - low + 1)
-        _check_size(path, width, height, path.stat().st_size)
+        check_size(path, width, height, path.stat().st_size)
         with OpenEXR.File(str(path), separate_channels=True) as file:
             header = dict(file.header())
             channels = {name: np.asarray(c.pixels) for name, c in file.channels().items()}
@@ -244,6 +247,8 @@ def write_png(path: Path, pixels: npt.NDArray[Any], comment: str = "", *, pq: bo
         else:
             spec.attribute("oiio:ColorSpace", "sRGB")
         spec.attribute("oiio:UnassociatedAlpha", 1)  # else colours are divided by alpha
+        # One filter for all rows: libpng tries all on each row, for 7 % less and 1.6 times as long.
+        spec.attribute("png:filter", _PNG_SUB)
         spec.attribute("png:compressionLevel", 4)
         if comment:
             spec.attribute("ImageDescription", comment)

@@ -38,7 +38,7 @@ from hdrusd.images import read_exr
 
 from .gallery import PRIVATE, write_sheets
 
-LEGACY = (".gltf", ".glb", ".obj", ".osg", ".osgt")
+LEGACY = (".3ds", ".flt", ".gltf", ".glb", ".obj", ".osg", ".osgt", ".dae", ".zae")
 STAGES = (".usda", ".usdc", ".usd", ".usdz")
 
 #: Exit codes of the README that say why a file ended without a picture.

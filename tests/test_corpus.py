@@ -19,6 +19,7 @@ REAL = (
     "delta3d/examples/data/StaticMeshes/lamps/Lamppost_Trident_PHYSICS.osg",
     "derived-osg/night_street.osgt",
     "derived-usd/sedan.usdz",
+    "synthetic/night_street.flt",
     "gazebo/stop_light/meshes/stop_light.obj",
     "gltf-blender-io/22_vertex_color/22_vertex_color.gltf",
     "godot-demos/truck_town/town/lamp/scene.gltf",
@@ -32,16 +33,20 @@ REAL = (
 #: What of the hostile files has nothing in it that can be trusted, and must be refused as input.
 BROKEN = (
     "dag_two_parents.gltf",
+    "deep_push.flt",
     "empty.glb",
     "empty.obj",
     "empty.osgt",
     "empty.usda",
     "empty.usdc",
+    "extref_cycle_a.flt",
     "huge_count.gltf",
     "huge_glb_chunk.glb",
     "node_cycle.gltf",
     "png_named.obj",
+    "trunc_palm.flt",
     "uri_file.gltf",
+    "zero_record.flt",
 )
 
 #: What of them is whole but for textures and names, and must still be shown.

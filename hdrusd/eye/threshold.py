@@ -33,10 +33,7 @@ def tvi_rod(adapting: npt.ArrayLike) -> Array:
 def tvi_ward(adapting: npt.ArrayLike) -> Array:
     """Threshold of the whole eye in cd/m2: rods below 0.96 cd/m2, cones above (Ward 1997)."""
     x = _log10(adapting)
-    found, dim = _cone(x), x < -0.0184
-    if dim.any():
-        found = np.where(dim, _rod(x), found)
-    return np.power(10.0, found)
+    return np.power(10.0, np.where(x < -0.0184, _rod(x), _cone(x)))
 
 
 def _log10(adapting: npt.ArrayLike) -> Array:

@@ -2,7 +2,7 @@
 
 Averages and extremes: a fragment takes in a block of pixels, NumPy adds up the blocks
 in float64. Every pixel counts once, which mipmaps of an odd size do not grant. A block is a
-piece of a row: one of 16 x 8 pixels takes a fifth longer.
+piece of a row: one of 16 x 8 pixels takes a tenth longer.
 
 Percentiles: the upper 16 bits of each luminance's float32 are read back and counted.
 Such a bin is 1/128 of its octave's lower end wide, so its middle is within 0.4 % of

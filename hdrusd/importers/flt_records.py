@@ -13,7 +13,6 @@ this package are its operation codes.
 from __future__ import annotations
 
 import struct
-from array import array
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.errors import InputError, SourceRef
+from hdrusd.importers.flt_walk import walk
 from hdrusd.importers.importer import Limits, Resolver
 from hdrusd.report import Kind, Report
 
@@ -49,9 +49,6 @@ NODES = frozenset(
 #: Bytes of a header and of the largest record of fixed size that is read as an array.
 _HEADER = struct.Struct(">HH")
 PADDING = 128
-
-#: More records than a database of 2 GiB has; an index of them is held in memory.
-_MOST_RECORDS = 50_000_000
 
 #: The oldest and newest revision whose layouts are known.
 _OLDEST, _NEWEST = 1420, 1699
@@ -206,63 +203,27 @@ def load(resolver: Resolver, report: Report) -> Document:
     if unit not in _UNITS:
         text = f"vertex coordinate unit {unit}; want 0, 1, 4, 5 or 8; metres are used"
         report.add(Kind.ASSUMED, "flt-unit", SourceRef(source, "byte 62"), "", text)
-    places, continuations = _walk(data, source)
+    places = walk(data, source)
     data += bytes(PADDING)
     buffer = np.frombuffer(data, np.uint8)
-    records = _indexed(buffer, places, continuations, source, report, resolver.limits)
+    records = _indexed(buffer, places, source, report, resolver.limits)
     unit_m = _UNITS.get(unit, 1.0)
     return Document(
         source, report, resolver.limits, resolver, data, buffer, records, version, unit_m
     )
 
 
-def _walk(data: bytes, source: Path) -> tuple[array[int], list[int]]:
-    """The bytes where records begin, and of continuations. Raises InputError."""
-    places: array[int] = array("q")
-    continuations: list[int] = []
-    add, header = places.append, _HEADER.unpack_from
-    at, end = 0, len(data)
-    while at + 4 <= end:
-        op, size = header(data, at)
-        if size < 4 or at + size > end:
-            if not any(data[at : at + 4096]) and not data[at:].strip(b"\0"):
-                break  # zeros that fill up the last block
-            place = SourceRef(source, f"byte {at}")
-            want = f"want 4 to {end - at}, what is left of the file"
-            raise InputError(place, f"record {op} of length {size}; {want}")
-        if op == CONTINUATION:
-            continuations.append(at)
-        else:
-            add(at)
-        if op == VERTEX_PALETTE:
-            size = _past_vertices(data, at)
-        at += size
-        if len(places) > _MOST_RECORDS:
-            raise InputError(SourceRef(source, f"byte {at}"), f"more than {_MOST_RECORDS} records")
-    return places, continuations
-
-
-def _past_vertices(data: bytes, at: int) -> int:
-    """Bytes of a vertex palette with its vertices, if there is a record behind them."""
-    (length,) = struct.unpack_from(">I", data[at + 4 : at + 8] + bytes(4))
-    after = at + length
-    if length >= 8 and after + 4 <= len(data):
-        op, size = _HEADER.unpack_from(data, after)
-        if 1 <= op <= 150 and size >= 4 and after + size <= len(data):
-            return int(length)
-    return int(length) if length >= 8 and after == len(data) else 8
-
-
 def _indexed(
     buffer: Bytes,
-    places: array[int],
-    continuations: list[int],
+    at: Integers,
     source: Path,
     report: Report,
     limits: Limits,
 ) -> Records:
-    at = np.frombuffer(places, np.int64)
     op = np.asarray(buffer[at].astype(np.uint16) << 8 | buffer[at + 1], np.uint16)
+    goes_on = op == CONTINUATION
+    continuations = at[goes_on].tolist()
+    at, op = at[~goes_on], op[~goes_on]
     size = buffer[at + 2].astype(np.int64) << 8 | buffer[at + 3]
     push, pop = np.isin(op, _PUSHES), np.isin(op, _POPS)
     level = np.cumsum(push, dtype=np.int32) - np.cumsum(pop, dtype=np.int32)

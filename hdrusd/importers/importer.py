@@ -142,13 +142,19 @@ class Importer(Protocol):
 
 #: Name of the format to its reader.
 IMPORTERS: Registry[Importer] = Registry("importer", "hdrusd.importers")
+IMPORTERS.add("collada", "hdrusd.importers.collada:read")
 IMPORTERS.add("flt", "hdrusd.importers.flt:read")
+IMPORTERS.add("3ds", "hdrusd.importers.tds:read")
 IMPORTERS.add("gltf", "hdrusd.importers.gltf:read")
 IMPORTERS.add("obj", "hdrusd.importers.obj:read")
 IMPORTERS.add("osg", "hdrusd.importers.osg:read")
 
 #: File suffix (lower case) to the name of its format.
 SUFFIXES = {
+    ".dae": "collada",
+    ".zae": "collada",
+    ".kmz": "collada",
+    ".3ds": "3ds",
     ".flt": "flt",
     ".gltf": "gltf",
     ".glb": "gltf",

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -28,6 +28,8 @@ M3D_MAGIC = 0x4D4D
 
 _HEADER = struct.Struct("<HI")
 _COLOR_F, _COLOR_24, _LIN_COLOR_24, _LIN_COLOR_F = range(0x0010, 0x0014)
+#: Colours for the screen, then those marked as linear.
+COLORS = (_COLOR_F, _COLOR_24, _LIN_COLOR_F, _LIN_COLOR_24)
 _INT_PERCENTAGE = 0x0030
 #: A whole number of percent, and a share as a float.
 PERCENTAGES = (_INT_PERCENTAGE, 0x0031)
@@ -184,20 +186,26 @@ class Document:
         """
         found: dict[int, RGB] = {}
         for child in self.children(chunk):
-            if child.tag in (_COLOR_F, _LIN_COLOR_F):
-                values = self.floats(child, 3, thing)
-                if values is not None:
-                    found.setdefault(child.tag, (values[0], values[1], values[2]))
-            elif child.tag in (_COLOR_24, _LIN_COLOR_24) and child.begin + 3 <= child.end:
-                r, g, b = self.data[child.begin : child.begin + 3]
-                found.setdefault(child.tag, (r / 255.0, g / 255.0, b / 255.0))
+            if child.tag in COLORS:
+                self.add_color(found, child, thing)
             else:
                 self.unread(child, thing)
-        for tag in (_COLOR_F, _COLOR_24, _LIN_COLOR_F, _LIN_COLOR_24):
-            if tag in found:
-                return found[tag]
-        self._wrong(chunk, thing, "a colour")
-        return None
+        color = preferred(found)
+        if color is None:
+            self._wrong(chunk, thing, "a colour")
+        return color
+
+    def add_color(self, found: dict[int, RGB], chunk: Chunk, thing: str) -> None:
+        """Put what a chunk of ``COLORS`` itself says under its tag; the first one counts."""
+        if chunk.tag in (_COLOR_F, _LIN_COLOR_F):
+            values = self.floats(chunk, 3, thing)
+            if values is not None:
+                found.setdefault(chunk.tag, (values[0], values[1], values[2]))
+        elif chunk.begin + 3 <= chunk.end:
+            r, g, b = self.data[chunk.begin : chunk.begin + 3]
+            found.setdefault(chunk.tag, (r / 255.0, g / 255.0, b / 255.0))
+        else:
+            self._wrong(chunk, thing, "three bytes")
 
     def share(self, chunk: Chunk, default: float, thing: str) -> float:
         """A percentage as a share, 0 to 1; what is outside is clamped, with a finding."""
@@ -222,3 +230,8 @@ class Document:
     def _wrong(self, chunk: Chunk, thing: str, wanted: str) -> None:
         text = f"{chunk.end - chunk.begin} bytes; want {wanted}; the default is used"
         self.note(Kind.INVALID, "3ds-value", chunk, thing, text)
+
+
+def preferred(found: Mapping[int, RGB]) -> RGB | None:
+    """Of several ways to say a colour the first of ``COLORS``."""
+    return next((found[tag] for tag in COLORS if tag in found), None)

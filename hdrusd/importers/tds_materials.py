@@ -245,7 +245,9 @@ class MaterialReader:
             text = f"{', '.join(dict.fromkeys(switches))}: no home; dropped"
             self._note(said, Kind.DROPPED, "3ds-material-switch", text)
         if said.shading == _METAL:
-            text = "metal shading, which takes its highlight's colour from the diffuse one; as Phong"
+            text = (
+                "metal shading, which takes its highlight's colour from the diffuse one; as Phong"
+            )
             self._note(said, Kind.REPLACED, "3ds-shading", text)
         elif said.shading > _METAL:
             text = f"shading {said.shading}; want 0 to 4; read as Phong"

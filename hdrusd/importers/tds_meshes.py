@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -97,7 +98,7 @@ class MeshReader:
             raise InputError(self.document.ref(chunk), text)
         return raw if raw.whole else None
 
-    def _array(self, raw: RawMesh, chunk: Chunk, kind: str, width: int) -> npt.NDArray[np.float32]:
+    def _array(self, raw: RawMesh, chunk: Chunk, kind: str, width: int) -> npt.NDArray[Any]:
         """Rows behind their 16-bit count; a mesh of which some are missing is not whole."""
         count = self.document.word(chunk, 0, raw.name)
         bytes_a_row = width * np.dtype(kind).itemsize
@@ -107,17 +108,19 @@ class MeshReader:
             self.document.note(Kind.INVALID, "3ds-array", chunk, raw.name, text)
             raw.whole = False
             count = 0
-        data = np.frombuffer(self.document.data, kind, count * width, min(chunk.begin + 2, chunk.end))
-        return data.reshape(-1, width)
+        begin = min(chunk.begin + 2, chunk.end)
+        return np.frombuffer(self.document.data, kind, count * width, begin).reshape(-1, width)
 
     def _faces(self, raw: RawMesh, chunk: Chunk) -> None:
         """Corners and flags, then chunks that say more of the faces."""
-        rows = self._array(raw, chunk, "<u2", 4).view("<u2")
+        rows = self._array(raw, chunk, "<u2", 4)
         raw.faces = rows[:, :3]
         raw.worn = np.full(len(rows), -1, np.int32)
         seams = int(np.count_nonzero(rows[:, 3] & _WRAP_FLAGS))
         if seams:
-            text = f"{seams} faces at a seam of their mapping; their coordinates are kept as they are"
+            text = (
+                f"{seams} faces at a seam of their mapping; their coordinates are kept as they are"
+            )
             self.document.note(Kind.DROPPED, "3ds-face-wrap", chunk, raw.name, text)
         if not raw.whole:
             return
@@ -213,8 +216,8 @@ class MeshMaker:
 
     def _usable(self, raw: RawMesh, points: Floats) -> npt.NDArray[np.int64]:
         """The numbers of the faces whose points are there and finite."""
-        there = (raw.faces < len(points)).all(axis=1)
-        finite = np.isfinite(points).all(axis=1)
+        there = np.asarray((raw.faces < len(points)).all(axis=1))
+        finite = np.asarray(np.isfinite(points).all(axis=1))
         good = there.copy()
         good[there] = finite[raw.faces[there]].all(axis=1)
         for code, count, text in (
@@ -288,8 +291,10 @@ class MeshMaker:
 
 def _subsets(numbers: Ints) -> tuple[int | None, tuple[Subset, ...]]:
     """Either one material for all faces or a subset for each."""
-    worn = np.unique(numbers).tolist()
-    if len(worn) == 1:
-        return worn[0], ()
-    faces = [np.flatnonzero(numbers == number).astype(np.int32) for number in worn]
-    return None, tuple(Subset(number, part) for number, part in zip(worn, faces, strict=True))
+    first = int(numbers[0])
+    if np.all(numbers == first):
+        return first, ()
+    order = np.argsort(numbers, kind="stable").astype(np.int32)
+    ranked = numbers[order]
+    parts = np.split(order, np.flatnonzero(np.diff(ranked)) + 1)
+    return None, tuple(Subset(int(numbers[part[0]]), part) for part in parts)

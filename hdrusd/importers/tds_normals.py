@@ -49,9 +49,8 @@ def smoothed(points: Floats, corners: Corners, groups: Groups) -> Floats:
         shared = np.flatnonzero(groups & np.uint32(mask))
         vertices = corners[shared].reshape(-1)
         parts = weighted[shared].reshape(-1, 3)
-        sums = np.stack(
-            [np.bincount(vertices, parts[:, axis], len(points)) for axis in range(3)], axis=1
-        )
+        axes = (np.bincount(vertices, parts[:, axis], len(points)) for axis in range(3))
+        sums = np.stack([np.asarray(axis, np.float64) for axis in axes], axis=1)
         mine = np.flatnonzero(groups == mask)
         found = sums[corners[mine]]
         # Faces back to back cancel: each keeps its own.
@@ -62,7 +61,7 @@ def smoothed(points: Floats, corners: Corners, groups: Groups) -> Floats:
 
 def _face_vectors(points: Floats, corners: Corners) -> Doubles:
     a, b, c = (points[corners[:, k]].astype(np.float64) for k in range(3))
-    return np.asarray(np.cross(b - a, c - a))
+    return np.cross(b - a, c - a).astype(np.float64)
 
 
 def _angles(points: Floats, corners: Corners) -> Doubles:

@@ -222,7 +222,7 @@ class LegacyScene:
     """A whole file. Tables are shared: a mesh used by 300 nodes stands here once."""
 
     source: Path
-    format: str  # "gltf", "obj", "osg"
+    format: str  # "3ds", "gltf", "obj", "osg"
     roots: list[Node] = field(default_factory=list)
     meshes: list[Mesh] = field(default_factory=list)
     materials: list[Material] = field(default_factory=list)

@@ -3,12 +3,15 @@
 IESNA LM-63-2002 and ANSI/IES LM-63-19; candela = value x multiplier x ballast factor, and
 x the ballast-lamp photometric factor in 1986 and 1991 alone: the later editions keep its
 place for other things. The lumens of the lamps do not scale anything.
+
+``parse_ies`` and ``write_ies`` have a file as it stands, ``IesFile.luminaire`` what it means.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
@@ -18,15 +21,35 @@ from hdrusd.photometry.luminaire import (
     MOST_ANGLES,
     MOST_BYTES,
     MOST_VALUES,
+    At,
     Doubles,
     Luminaire,
     Opening,
     Type,
     checked,
+    plain,
 )
 from hdrusd.report import Kind, Report
 
 _FOOT = 0.3048  # m
+
+#: First line of each edition; 1986 has none.
+LABELS = {
+    1986: "",
+    1991: "IESNA91",
+    1995: "IESNA:LM-63-1995",
+    2002: "IESNA:LM-63-2002",
+    2019: "IES:LM-63-2019",
+}
+
+_DEFINED = """
+TEST TESTLAB TESTDATE TESTMETHOD NEARFIELD ISSUEDATE DATE MANUFAC LUMCAT LUMINAIRE LAMPCAT LAMP
+BALLASTCAT BALLAST MAINTCAT DISTRIBUTION FLASHAREA COLORCONSTANT LAMPPOSITION FILEGENINFO OTHER
+SEARCH BLOCK ENDBLOCK
+"""
+
+#: Keywords that LM-63 defines; a user's own begin with an underscore.
+KEYWORDS = frozenset(_DEFINED.split())
 
 #: "IESNA91", "IESNA:LM-63-1995", "IES:LM-63-2019"
 _LABEL = re.compile(r"IES(?:NA)?\s*:?\s*(?:LM-?63-?)?\s*(?:19|20)?(86|91|95|02|19)\b", re.I)
@@ -38,6 +61,69 @@ _TYPES: dict[int, Type] = {1: "C", 2: "B", 3: "A"}
 
 #: Lines of one lamp's tilt: more angles than a goniometer has stops are no tilt.
 _MOST_TILT = 1024
+
+#: Numbers a line: ten of 17 digits stay below the 256 characters of LM-63-2002.
+_A_LINE = 10
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tilt:
+    """The share of its light that a lamp gives at angles of tilt, degrees."""
+
+    geometry: float  # 1 the lamp is vertical, 2 horizontal in any tilt, 3 tilts along
+    angles: Doubles
+    factors: Doubles
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IesFile:
+    """What an LM-63 file says, in its own numbers and units."""
+
+    edition: int
+    keywords: Mapping[str, str]  # without underscores; the lines of [MORE] follow a line feed
+    tilt: Tilt | None
+    lamps: float
+    lumens: float  # of one lamp; -1 for absolute photometry
+    multiplier: float
+    type: Type
+    feet: bool
+    size: tuple[float, float, float]  # width, length, height of the opening; signs tell its shape
+    ballast: float
+    companion: float  # 1986, 1991 photometric factor; 1995, 2002 unused; 2019 file generation
+    watts: float
+    angles: Doubles  # (n,)
+    planes: Doubles  # (m,)
+    candela: Doubles  # (m, n), before any factor
+    head: str  # what stands before TILT=
+    at: At
+
+    @property
+    def factor(self) -> float:
+        """What the candela are multiplied by, in a level luminaire."""
+        factor = self.multiplier * self.ballast
+        if self.edition <= 1991:
+            factor *= self.companion
+        if self.tilt is not None:
+            factor *= float(np.interp(0.0, self.tilt.angles, self.tilt.factors))
+        return factor
+
+    def luminaire(self, place: SourceRef, report: Report) -> Luminaire:
+        """What the file means. Raises InputError."""
+        keywords = self.keywords
+        return checked(
+            place,
+            report,
+            name=keywords.get("LUMINAIRE") or keywords.get("LUMCAT") or place.file.name,
+            type=self.type,
+            planes=self.planes,
+            angles=self.angles,
+            candela=self.candela,
+            factor=self.factor,
+            lumens=None if self.lumens < 0.0 else self.lumens,
+            opening=_opening(*self.size, _FOOT if self.feet else 1.0),
+            keywords=keywords,
+            at=self.at,
+        )
 
 
 def is_ies(data: bytes) -> bool:
@@ -51,7 +137,17 @@ def read_ies(
     report: Report,
     tilt_file: Callable[[str], bytes | None] = lambda name: None,
 ) -> Luminaire:
-    """Read the bytes of an LM-63 file. Raises InputError.
+    """The luminaire in the bytes of an LM-63 file; see ``parse_ies``. Raises InputError."""
+    return parse_ies(data, place, report, tilt_file).luminaire(place, report)
+
+
+def parse_ies(
+    data: bytes,
+    place: SourceRef,
+    report: Report,
+    tilt_file: Callable[[str], bytes | None] = lambda name: None,
+) -> IesFile:
+    """Read the bytes of an LM-63 file as they stand. Raises InputError.
 
     ``tilt_file``: the bytes of the file that ``TILT=name`` names, None where there is none.
     """
@@ -61,41 +157,83 @@ def read_ies(
     tilt = _TILT.search(text)
     if tilt is None:
         raise InputError(place, "no TILT= line; want an IES LM-63 file")
-    edition, keywords = _header(text[: tilt.start()], place, report)
-    numbers = _Numbers(text[tilt.end() :], place)
-    factor = _tilt_factor(tilt[1].strip(), numbers, place, report, tilt_file)
+    head = text[: tilt.start()]
+    edition, keywords = _header(head, place, report)
+    line = text.count("\n", 0, tilt.end()) + 1
+    numbers = _Numbers(text[tilt.end() :], SourceRef(place.file, line))
+    tilted = _tilt(tilt[1].strip(), numbers, report, tilt_file)
 
-    _, lumens, multiplier = numbers.take(3, "lamps, lumens and multiplier").tolist()
+    lamps, lumens, multiplier = numbers.take(3, "lamps, lumens and multiplier").tolist()
     sizes = numbers.counts(2, "counts of angles", MOST_ANGLES)
     if sizes[0] * sizes[1] > MOST_VALUES:
-        raise InputError(place, f"{sizes[0]} x {sizes[1]} candela; want at most {MOST_VALUES}")
+        problem = f"{sizes[0]} x {sizes[1]} candela; want at most {MOST_VALUES}"
+        raise InputError(numbers.at("counts of angles"), problem)
     type_code, units = numbers.counts(2, "photometric type and units", 3)
     if type_code not in _TYPES or units not in (1, 2):
         raise InputError(
-            place, f"type {type_code}, units {units}; want type 1, 2 or 3, units 1 or 2"
+            numbers.at("photometric type and units"),
+            f"type {type_code}, units {units}; want type 1, 2 or 3, units 1 or 2",
         )
     width, length, height = numbers.take(3, "width, length and height").tolist()
-    ballast, photometric, _ = numbers.take(3, "ballast factor, its companion and watts").tolist()
+    ballast, companion, watts = numbers.take(3, "ballast factor, its companion and watts").tolist()
     angles = numbers.take(sizes[0], "vertical angles")
     planes = numbers.take(sizes[1], "horizontal angles")
     candela = numbers.take(sizes[0] * sizes[1], "candela").reshape(sizes[1], sizes[0])
     numbers.finish(report)
-
-    factor *= multiplier * ballast * (photometric if edition <= 1991 else 1.0)
-    name = keywords.get("LUMINAIRE") or keywords.get("LUMCAT") or place.file.name
-    return checked(
-        place,
-        report,
-        name=name,
-        type=_TYPES[type_code],
-        planes=planes,
-        angles=angles,
-        candela=candela,
-        factor=factor,
-        lumens=None if lumens < 0.0 else lumens,
-        opening=_opening(width, length, height, _FOOT if units == 1 else 1.0),
+    return IesFile(
+        edition=edition,
         keywords=keywords,
+        tilt=tilted,
+        lamps=lamps,
+        lumens=lumens,
+        multiplier=multiplier,
+        type=_TYPES[type_code],
+        feet=units == 1,
+        size=(width, length, height),
+        ballast=ballast,
+        companion=companion,
+        watts=watts,
+        angles=angles,
+        planes=planes,
+        candela=candela,
+        head=head,
+        at=numbers.at,
     )
+
+
+def write_ies(file: IesFile) -> bytes:
+    """The bytes of an LM-63 file, every digit kept: ``parse_ies`` of them gives ``file``.
+
+    Latin-1, as files are written that are not plain ASCII; "?" for what it has not.
+    """
+    lines = [LABELS[file.edition]] if LABELS[file.edition] else []
+    for key, value in file.keywords.items():
+        name = key if key in KEYWORDS else f"_{key}"
+        first, *more = value.split("\n")
+        lines += [f"[{name}] {first}".rstrip(), *(f"[MORE] {line}".rstrip() for line in more)]
+    if file.tilt is None:
+        lines.append("TILT=NONE")
+    else:
+        lines += ["TILT=INCLUDE", plain(file.tilt.geometry), str(len(file.tilt.angles))]
+        lines += [*_wrapped(file.tilt.angles), *_wrapped(file.tilt.factors)]
+    code = next(code for code, type in _TYPES.items() if type == file.type)
+    counts = f"{len(file.angles)} {len(file.planes)} {code} {1 if file.feet else 2}"
+    lamps = _row([file.lamps, file.lumens, file.multiplier])
+    lines += [f"{lamps} {counts} {_row(file.size)}"]
+    lines += [_row([file.ballast, file.companion, file.watts])]
+    lines += [*_wrapped(file.angles), *_wrapped(file.planes)]
+    for plane in file.candela:
+        lines += _wrapped(plane)
+    return "".join(f"{line}\r\n" for line in lines).encode("latin-1", "replace")
+
+
+def _row(values: Iterable[float]) -> str:
+    return " ".join(map(plain, values))
+
+
+def _wrapped(values: Doubles) -> list[str]:
+    listed = values.tolist()
+    return [_row(listed[i : i + _A_LINE]) for i in range(0, len(listed), _A_LINE)]
 
 
 def with_tilt(data: bytes, tilt_file: Callable[[str], bytes | None]) -> bytes:
@@ -122,50 +260,54 @@ def _header(text: str, place: SourceRef, report: Report) -> tuple[int, dict[str,
         named = bool(lines) and lines[0].strip().upper().startswith("IES")
         edition = 2019 if named else 1986
         text = f"{'an unknown' if named else 'no'} edition label; read as LM-63-{edition}"
-        report.add(Kind.ASSUMED, "profile-edition", place, "", text)
+        report.add(Kind.ASSUMED, "profile-edition", SourceRef(place.file, 1), "", text)
     else:
         edition = _EDITIONS[label[1]]
     keywords: dict[str, list[str]] = {}
     last = ""
     for line in lines:
-        found = _KEYWORD.match(line)
+        found = keyword(line)
         if found is not None:
-            key = found[1].strip().upper().lstrip("_")
-            last = last if key == "MORE" else key
-            keywords.setdefault(last, []).append(found[2].strip())
+            last = last if found[0] == "MORE" else found[0]
+            if last:
+                keywords.setdefault(last, []).append(found[1])
     return edition, {key: "\n".join(values) for key, values in keywords.items()}
+
+
+def keyword(line: str) -> tuple[str, str] | None:
+    """Name and value of a line that has a keyword; a user's name is without its underscore."""
+    found = _KEYWORD.match(line)
+    return None if found is None else (found[1].strip().upper().lstrip("_ "), found[2].strip())
 
 
 def _text(data: bytes) -> str:
     return data.decode("latin-1").replace("\r\n", "\n").replace("\r", "\n")
 
 
-def _tilt_factor(
-    kind: str,
-    numbers: _Numbers,
-    place: SourceRef,
-    report: Report,
-    tilt_file: Callable[[str], bytes | None],
-) -> float:
-    """What the lamp gives in a level luminaire, as a share of what was measured."""
+def _tilt(
+    kind: str, numbers: _Numbers, report: Report, tilt_file: Callable[[str], bytes | None]
+) -> Tilt | None:
+    """What the lamp gives at an angle, as a share of what was measured."""
     if kind.upper() == "NONE":
-        return 1.0
+        return None
+    place = numbers.place
     if kind.upper() != "INCLUDE":
         data = tilt_file(kind)
         if data is None or len(data) > MOST_BYTES:
             text = f"TILT={kind}: no such file; the lamp is taken to give its all"
             report.add(Kind.MISSING, "profile-tilt", place, "", text)
-            return 1.0
-        numbers = _Numbers(_text(data), place)
-    numbers.take(1, "lamp to luminaire geometry")
+            return None
+        numbers = _Numbers(_text(data), SourceRef(place.file, f"{kind}:1"))
+    (geometry,) = numbers.take(1, "lamp to luminaire geometry").tolist()
     (count,) = numbers.counts(1, "count of tilt angles", _MOST_TILT)
     angles = numbers.take(count, "tilt angles")
     factors = numbers.take(count, "tilt factors")
     if (angles[1:] <= angles[:-1]).any() or max(np.abs(angles).max(), np.abs(factors).max()) > 360:
-        raise InputError(place, "tilt: want ascending angles and factors near 1")
+        problem = "tilt: want ascending angles and factors near 1"
+        raise InputError(numbers.at("tilt angles"), problem)
     text = "the lamp's output depends on its tilt; the luminaire is taken to be level"
     report.add(Kind.ASSUMED, "profile-tilt", place, "", text)
-    return float(np.interp(0.0, angles, factors))
+    return Tilt(geometry, angles, factors)
 
 
 def _opening(width: float, length: float, height: float, unit: float) -> Opening:
@@ -180,23 +322,46 @@ def _opening(width: float, length: float, height: float, unit: float) -> Opening
 
 
 class _Numbers:
-    """The numbers after the TILT line, one after the other, whatever stands between them."""
+    """The numbers after the TILT line, one after the other, whatever stands between them.
+
+    ``place``: of the first line of ``text``.
+    """
 
     def __init__(self, text: str, place: SourceRef) -> None:
-        self.words = (match[0] for match in _WORD.finditer(text))
+        self.text = text
+        self.words = _WORD.finditer(text)
         self.place = place
+        self.starts: dict[str, int] = {}
+
+    def at(self, part: str, index: int = 0) -> SourceRef:
+        """The line of the ``index``-th number of a part, or of the part after it."""
+        name = _PARTS.get(part, part)
+        start = self.starts.get(name, 0)
+        word = next(islice(_WORD.finditer(self.text, start), index, None), None)
+        lines = self.text.count("\n", 0, len(self.text.rstrip()) if word is None else word.start())
+        first = self.place.place
+        if isinstance(first, str):  # in the file that TILT= names
+            return SourceRef(self.place.file, f"{first.rpartition(':')[0]}:{lines + 1}")
+        return SourceRef(self.place.file, (first or 1) + lines)
 
     def take(self, count: int, what: str) -> Doubles:
         """The next ``count`` numbers; InputError where the file ends first."""
-        chosen = list(islice(self.words, count))
+        first = next(self.words, None)
+        self.starts[what] = len(self.text) if first is None else first.start()
+        chosen = [] if first is None else [first[0]]
+        chosen += [word[0] for word in islice(self.words, count - 1)]
         if len(chosen) < count:
-            raise InputError(self.place, f"{what}: {len(chosen)} numbers left; want {count}")
+            problem = f"{what}: {len(chosen)} numbers left; want {count}"
+            raise InputError(self.at(what, len(chosen)), problem)
         try:
             values = np.array([float(token) for token in chosen], np.float64)
         except ValueError:
-            raise InputError(self.place, f"{what}: no number among them") from None
+            raise InputError(
+                self.at(what, _first_bad(chosen)), f"{what}: no number among them"
+            ) from None
         if not np.isfinite(values).all() or any("_" in token for token in chosen):
-            raise InputError(self.place, f"{what}: no finite number among them")
+            problem = f"{what}: no finite number among them"
+            raise InputError(self.at(what, _first_bad(chosen)), problem)
         return values
 
     def counts(self, count: int, what: str, most: int) -> list[int]:
@@ -204,11 +369,29 @@ class _Numbers:
         values = self.take(count, what)
         if ((values < 1) | (values > most) | (values != np.round(values))).any():
             shown = ", ".join(f"{value:g}" for value in values)
-            raise InputError(self.place, f"{what}: {shown}; want integers from 1 to {most}")
+            raise InputError(self.at(what), f"{what}: {shown}; want integers from 1 to {most}")
         return [int(value) for value in values]
 
     def finish(self, report: Report) -> None:
         """A finding where something follows; DOS ends a text with 0x1A."""
-        if next((word for word in self.words if word.strip("\x00\x1a")), ""):
+        rest = next((word for word in self.words if word[0].strip("\x00\x1a")), None)
+        if rest is not None:
+            self.starts["rest"] = rest.start()
             text = "what follows the last candela is not read"
-            report.add(Kind.DROPPED, "profile-trailing", self.place, "", text)
+            report.add(Kind.DROPPED, "profile-trailing", self.at("rest"), "", text)
+
+
+#: What ``luminaire.checked`` calls the parts.
+_PARTS = {"planes": "horizontal angles", "angles": "vertical angles"}
+
+
+def _first_bad(words: list[str]) -> int:
+    """Index of the first word that is no finite number."""
+    for index, word in enumerate(words):
+        try:
+            if "_" not in word and np.isfinite(float(word)):
+                continue
+        except ValueError:
+            pass
+        return index
+    return 0

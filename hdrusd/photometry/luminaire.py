@@ -8,7 +8,7 @@ to all planes of H (A) or the horizontal one to all planes of V (B); a row is on
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -20,6 +20,9 @@ from hdrusd.report import Kind, Report
 
 Doubles = npt.NDArray[np.float64]
 Type = Literal["A", "B", "C"]
+
+#: Where a number is said: of "planes", "angles" or "candela" (row by row), and its index.
+At = Callable[[str, int], SourceRef]
 
 #: Bytes of a file that are read: 721 x 1441 values of eight characters take 9 MB.
 MOST_BYTES = 16 << 20
@@ -135,36 +138,45 @@ def checked(
     lumens: float | None,
     opening: Opening,
     keywords: Mapping[str, str],
+    at: At,
 ) -> Luminaire:
     """A ``Luminaire`` of what a file says: (m,), (n,) and (m, n). Raises InputError.
 
     ``factor``: what all candela are multiplied by.
     """
     widest, lowest, highest = _RANGES[type]
-    _ascending(place, "plane angles", planes, -widest, widest)
-    _ascending(place, "angles within a plane", angles, lowest, highest)
+    _ascending(at, "planes", "plane angles", planes, -widest, widest)
+    _ascending(at, "angles", "angles within a plane", angles, lowest, highest)
     if len(angles) < 2:
-        raise InputError(place, "angles within a plane: 1; want 2 or more")
+        raise InputError(at("angles", 0), "angles within a plane: 1; want 2 or more")
     if not 0.0 < factor < BRIGHTEST:
         raise InputError(place, f"the factors on its candela make {factor:g}; want more than 0")
-    if np.abs(candela).max() > BRIGHTEST or np.abs(candela).max() * factor > BRIGHTEST:
-        raise InputError(place, f"candela: want at most {BRIGHTEST:g}")
+    largest = float(np.abs(candela).max())
+    if largest > BRIGHTEST or largest * factor > BRIGHTEST:
+        index = int(np.abs(candela).argmax())
+        raise InputError(at("candela", index), f"candela: want at most {BRIGHTEST:g}")
     candela = candela * factor
     negative = candela < 0.0
     if negative.any():
         text = f"{int(negative.sum())} negative values, read as 0"
-        report.add(Kind.CLAMPED, "profile-negative", place, name, text)
+        first = at("candela", int(negative.argmax()))
+        report.add(Kind.CLAMPED, "profile-negative", first, name, text)
         candela = np.where(negative, 0.0, candela)
-    planes = _settled(place, type, planes)
+    planes = _settled(at("planes", 0), type, planes)
     return Luminaire(name, type, planes, angles, candela, lumens, opening, keywords)
 
 
-def _ascending(place: SourceRef, what: str, values: Doubles, least: float, most: float) -> None:
+def _ascending(at: At, part: str, what: str, values: Doubles, least: float, most: float) -> None:
     low, high = float(values.min()), float(values.max())
-    if low < least - _NEAR or high > most + _NEAR:
-        raise InputError(place, f"{what}: {low:g} to {high:g}; want {least:g} to {most:g}")
-    if (np.diff(values) < _APART).any():
-        raise InputError(place, f"{what}: not in ascending order")
+    outside = (values < least - _NEAR) | (values > most + _NEAR)
+    if outside.any():
+        problem = f"{what}: {low:g} to {high:g}; want {least:g} to {most:g}"
+        raise InputError(at(part, int(outside.argmax())), problem)
+    falling = np.diff(values) < _APART
+    if falling.any():
+        index = int(falling.argmax()) + 1
+        problem = f"{what}: {values[index]:g} after {values[index - 1]:g}, not in ascending order"
+        raise InputError(at(part, index), problem)
 
 
 def _settled(place: SourceRef, type: Type, planes: Doubles) -> Doubles:
@@ -240,3 +252,9 @@ def _even(x: Doubles) -> Doubles:
     """``_hats`` for a weight of 1."""
     half = np.diff(x) / 2.0
     return np.append(half, 0.0) + np.insert(half, 0, 0.0)
+
+
+def plain(value: float) -> str:
+    """A finite number with all its digits and without an exponent, which old readers lack."""
+    text = repr(float(value)).removesuffix(".0")
+    return np.format_float_positional(value, trim="-") if "e" in text else text

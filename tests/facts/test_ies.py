@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from photometric_files import GAMMA, IES, QUADRANT, ies, ies_text
@@ -148,7 +150,7 @@ def test_what_is_broken_is_one_line(text: str, problem: str) -> None:
     with pytest.raises(InputError) as error:
         ies(text)
     assert problem in str(error.value)
-    assert str(error.value).startswith("lamp.ies: ")
+    assert re.match(r"lamp\.ies(:\d+|:lamp\.tlt:\d+)?: ", str(error.value))
     assert "\n" not in str(error.value)
 
 

@@ -110,6 +110,25 @@ def test_only_what_is_needed(gl: Any) -> None:
     assert averages.log_average == measure(gl, rgb).log_average
 
 
+def test_foveal_image_alone_tells_the_rest(gl: Any) -> None:
+    rgb = night(200, 300)
+    measurer = Measurer(gl, Programs(gl))
+    got = measurer.measure(texture(gl, rgb), Need.FOVEAL, top_first=True)
+    wanted = statistics(rgb, Need.FOVEAL)
+    assert got.foveal.points.size == wanted.foveal.points.size == 168 * 112
+    assert got.log_average == pytest.approx(wanted.log_average, rel=ONE)
+    assert got.minimum == pytest.approx(wanted.minimum, rel=ONE)
+    assert got.maximum == pytest.approx(wanted.maximum, rel=ONE)
+    assert got.average == pytest.approx(wanted.average, rel=SUM)
+    assert got.p01 is got.p99 is wanted.p01 is wanted.p99 is None
+    # Twelve decades of ln have a standard deviation of 8; four of that of the points' mean.
+    whole = statistics(rgb)
+    error = 4.0 * 8.0 / np.sqrt(got.foveal.points.size)
+    assert np.log(got.log_average) == pytest.approx(np.log(whole.log_average), abs=error)
+    # Samples have 7 or 8 pixels a side, so that pixels weigh differently by a third at most.
+    assert got.average == pytest.approx(whole.average, rel=0.05)
+
+
 def test_context_is_left_as_it_was(gl: Any) -> None:
     measurer = Measurer(gl, Programs(gl))
     for size in ((16, 16), (40, 24), (16, 16)):  # targets are remade

@@ -10,7 +10,7 @@ layout(location = 1) out float total;  // sum over all pixels, cd/m2
 
 void main()
 {
-    float begin = floor(gl_FragCoord.x) * float(BLOCK) + 0.5;
+    float x = floor(gl_FragCoord.x) * float(BLOCK) + 0.5;
     // log2 from exponents and the product of mantissas: one logarithm for RUN <= 16 numbers
     // below 2 at a time, in place of one a pixel. A pixel that does not count is 1.
     int exponents = 0;
@@ -18,8 +18,8 @@ void main()
     total = 0.0;
     for (int run = 0; run < BLOCK; run += RUN) {
         float mantissas = 1.0;
-        for (int i = run; i < run + RUN; ++i) {
-            vec2 place = vec2(begin + float(i), gl_FragCoord.y) * texel;
+        for (int i = 0; i < RUN; ++i) {  // with other bounds it would not be unrolled
+            vec2 place = vec2(x + float(i), gl_FragCoord.y) * texel;
             float y = luminance(clean(textureLod(hdr, place, 0.0).rgb));
             bool counts = y > FLOOR;
             int bits = floatBitsToInt(counts ? y : 1.0);
@@ -31,6 +31,7 @@ void main()
             total += y;
         }
         logs += log2(mantissas);
+        x += float(RUN);
     }
     counted = vec4(logs + float(exponents), number, smallest, largest);
 }
