@@ -25,6 +25,7 @@ COMMANDS = {
     "convert",
     "render",
     "tonemap",
+    "bracket",
     "check",
     "info",
     "operators",

@@ -25,7 +25,7 @@ LAYERS = (
     {"eye"},
     {"glare", "photometry", "tonemap"},
     {"importers", "images"},
-    {"usd", "gpu", "adaptation_log", "contact_sheet", "course", "video"}
+    {"usd", "gpu", "adaptation_log", "bracket", "contact_sheet", "course", "video"}
     | {"frame_header", "frame_io"},
     {"job", "luminaires", "maps", "validation", "viewing"},
     {"by_products", "surfaces"},
@@ -40,7 +40,7 @@ THIRD_PARTY = {
     "pxr": {"schemas", "usd", "validation", "convert", "render"},
     "moderngl": {"gpu", "render", "viewing"},
     "OpenEXR": {"images"},
-    "OpenImageIO": {"contact_sheet", "images"},
+    "OpenImageIO": {"bracket", "contact_sheet", "images"},
     "PyOpenColorIO": {"tonemap"},
     "av": {"video"},
     "matplotlib": {"adaptation_log"},

@@ -1,7 +1,7 @@
 """The foveal image of a frame on the GPU; its definition is eye.foveal.foveal.
 
 Every pixel is fetched once, along rows into a texture of fw x h; its columns and the single
-pixels cost little beside that. On llvmpipe (two 2.5 GHz cores) at 1920x1080 that is 15 ms of
+pixels cost little beside that. On llvmpipe (two 2.5 GHz cores) at 1920x1080 that is 12 ms of
 CPU time; NumPy takes 58 ms once the frame is read. The pixels that every sample has across are
 a constant of the program, not a uniform: the loop is unrolled then, and a quarter faster.
 """

@@ -166,9 +166,10 @@ class _SceneReader:
         corners = [np.array((raw.place, raw.target)) for raw in self.objects.cameras.values()]
         corners += [np.array([raw.place]) for raw in self.objects.lights.values()]
         for raw in (raw for found in self.objects.meshes.values() for raw in found):
-            points = raw.points[np.isfinite(raw.points).all(axis=1)].astype(np.float64)
-            if len(points):
-                corners.append(np.stack([points.min(axis=0), points.max(axis=0)]))
+            ends = _ends(raw.points)
+            if ends is not None and not np.isfinite(ends).all():
+                ends = _ends(raw.points[np.isfinite(raw.points).all(axis=1)])
+            corners += [] if ends is None else [ends]
         if not corners:
             return 1.0
         every = np.concatenate(corners)
@@ -314,6 +315,14 @@ class _SceneReader:
     def _add_camera(self, node: Node, raw: RawCamera, width: float) -> None:
         node.cameras.append(len(self.scene.cameras))
         self.scene.cameras.append(camera(self.document, raw, width, self.size))
+
+
+def _ends(points: npt.NDArray[np.float32]) -> npt.NDArray[np.float64] | None:
+    """The least and the largest coordinates."""
+    if not len(points):
+        return None
+    with np.errstate(invalid="ignore"):  # a NaN that signals
+        return np.stack([points.min(axis=0), points.max(axis=0)]).astype(np.float64)
 
 
 def _aimed_light(raw: RawLight) -> Aimed:

@@ -104,7 +104,9 @@ class TrackReader:
             keys = np.frombuffer(data, plain, declared, at)
             if not keys["use"].any():
                 rows = np.zeros((declared, 1 + _PARAMETERS + width))
-                rows[:, 0], rows[:, 1 + _PARAMETERS :] = keys["frame"], keys["values"]
+                rows[:, 0] = keys["frame"]
+                with np.errstate(invalid="ignore"):  # a NaN that signals
+                    rows[:, 1 + _PARAMETERS :] = keys["values"]
                 return rows
         # A key is as long as its parameters say, so that it must be known for the next one.
         found: list[tuple[float, ...]] = []
@@ -227,8 +229,11 @@ def _grid(track: Track) -> tuple[Doubles, npt.NDArray[np.int64], Doubles]:
 
 
 def samples(keys: Doubles) -> Doubles:
-    """Keys (k,) in frames, and every frame between them, or fewer where they are too many."""
-    step = max(1.0, float(keys[-1] - keys[0]) / (_SAMPLES_A_KEY * len(keys)))
+    """Keys (k,) in frames, and every frame between them, or every so many where they are too many.
+
+    All are whole numbers, so that no two are the same but for rounding.
+    """
+    step = max(1.0, np.ceil(float(keys[-1] - keys[0]) / (_SAMPLES_A_KEY * len(keys))))
     return np.union1d(keys, np.arange(keys[0], keys[-1], step))
 
 

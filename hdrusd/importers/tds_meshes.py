@@ -34,6 +34,8 @@ _WRAP_FLAGS = 0x18
 #: Of the volume of a frame's axes to their lengths: below it the frame is flat.
 _FLAT = 1e-9
 
+_IDENTITY = np.eye(4)
+
 Doubles = npt.NDArray[np.float64]
 _Words = npt.NDArray[np.uint16]
 
@@ -55,8 +57,8 @@ class RawMesh:
 
     def world_to_local(self) -> Doubles | None:
         """(4, 4) from the file's points into the frame of the keyframer; None: it has no volume."""
-        if self.matrix is None:
-            return np.eye(4)
+        if self.matrix is None or np.array_equal(self.matrix, _IDENTITY):
+            return _IDENTITY
         axes = self.matrix[:3, :3]
         size = float(np.linalg.norm(axes, axis=1).prod())
         volume = float(np.linalg.det(axes))
@@ -181,7 +183,7 @@ class MeshMaker:
     def make(self, raw: RawMesh, matrix: Doubles | None) -> Mesh | None:
         """The mesh with its points moved by ``matrix``; None, with a finding, without faces."""
         points = raw.points
-        if matrix is not None and not np.array_equal(matrix, np.eye(4)):
+        if matrix is not None and matrix is not _IDENTITY:
             with np.errstate(all="ignore"):
                 moved = points.astype(np.float64) @ matrix[:3, :3] + matrix[3, :3]
                 points = moved.astype(np.float32)
@@ -190,8 +192,7 @@ class MeshMaker:
             text = f"no usable face among {len(raw.faces)}; the mesh is left out"
             self.document.note(Kind.INVALID, "3ds-no-faces", raw.chunk, raw.name, text)
             return None
-        used, corners = np.unique(raw.faces[keep], return_inverse=True)
-        corners = corners.reshape(-1, 3).astype(np.int64)
+        used, corners = _used(raw.faces[keep], len(points))
         points = np.ascontiguousarray(points[used], np.float32)
         numbers = self._worn(raw, keep)
         material, subsets = _subsets(numbers)
@@ -216,6 +217,9 @@ class MeshMaker:
 
     def _usable(self, raw: RawMesh, points: Floats) -> npt.NDArray[np.int64]:
         """The numbers of the faces whose points are there and finite."""
+        inside = len(raw.faces) > 0 and int(raw.faces.max()) < len(points)
+        if inside and np.isfinite(points).all():
+            return np.arange(len(raw.faces))
         there = np.asarray((raw.faces < len(points)).all(axis=1))
         finite = np.asarray(np.isfinite(points).all(axis=1))
         good = there.copy()
@@ -231,13 +235,14 @@ class MeshMaker:
 
     def _worn(self, raw: RawMesh, keep: npt.NDArray[np.int64]) -> Ints:
         """The number of each face's material in the scene."""
-        bare = int(np.count_nonzero(raw.worn[keep] == -1))
+        worn = raw.worn[keep]
+        bare = int(np.count_nonzero(worn == -1))
         table = np.array([*(self._number(raw, name) for name in raw.wears), 0], np.int32)
         if bare:
             text = f"{bare} faces without a material: OpenGL's default"
             self.document.note(Kind.ASSUMED, "3ds-material-none", raw.chunk, raw.name, text)
             table[-1] = self._number(raw, None)
-        return table[raw.worn[keep]]
+        return table[worn]
 
     def _number(self, raw: RawMesh, name: str | None) -> int:
         """Of a material; one that is not defined, and that of no name, are OpenGL's default."""
@@ -252,7 +257,7 @@ class MeshMaker:
             self.materials.append(material)
         return self._numbers[name]
 
-    def _texcoords(self, raw: RawMesh, used: npt.NDArray[np.uint16]) -> Floats | None:
+    def _texcoords(self, raw: RawMesh, used: npt.NDArray[np.int64]) -> Floats | None:
         values = raw.texcoords
         if values is None or not len(values):
             return None
@@ -287,6 +292,16 @@ class MeshMaker:
             text = f"more than {MOST_SETS} sets of smoothing groups; each face keeps its lowest"
             self.document.note(Kind.REPLACED, "3ds-smoothing", raw.chunk, raw.name, text)
         return smoothed(points, corners, groups)
+
+
+def _used(faces: _Words, count: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """The points in use, of ``count``, and the faces' corners as numbers among them."""
+    flags = np.zeros(count, np.bool_)
+    flags[faces] = True
+    used = np.flatnonzero(flags)
+    if len(used) == count:
+        return used, faces.astype(np.int64)
+    return used, (np.cumsum(flags, dtype=np.int64) - 1)[faces]
 
 
 def _subsets(numbers: Ints) -> tuple[int | None, tuple[Subset, ...]]:

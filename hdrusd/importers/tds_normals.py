@@ -19,6 +19,9 @@ from hdrusd.legacy.scene import Floats
 #: Sets of groups in one mesh that are told apart; each costs a pass over its faces.
 MOST_SETS = 256
 
+#: A sum of normals, weighted by angles, below which they point apart.
+_CANCELLED = 1e-6
+
 Doubles = npt.NDArray[np.float64]
 Groups = npt.NDArray[np.uint32]
 Corners = npt.NDArray[np.int64]
@@ -40,39 +43,44 @@ def smoothed(points: Floats, corners: Corners, groups: Groups) -> Floats:
     points: (n, 3); corners: (f, 3) in [0, n); groups: (f,), of few different sets
     (``reduced``). +Z where faces have no area.
     """
-    across = _unit(_face_vectors(points, corners))
-    weighted = across[:, None, :] * _angles(points, corners)[:, :, None]
-    out = np.repeat(across[:, None, :], 3, axis=1)
+    # Components first: of long rows NumPy makes faster work than of many short ones.
+    place = np.ascontiguousarray(points.T, np.float64)
+    a, b, c = (place[:, corners[:, k]] for k in range(3))
+    edges = (b - a, c - b, a - c)
+    facing, area = _unit(_cross(edges[0], -edges[2]))
+    angles = np.stack([np.arctan2(area, -_dot(edges[k], edges[k - 1])) for k in range(3)])
+    out = np.repeat(np.ascontiguousarray(facing.T, np.float32), 3, axis=0).reshape(-1, 3, 3)
     for mask in np.unique(groups).tolist():
         if mask == 0:
             continue
         shared = np.flatnonzero(groups & np.uint32(mask))
-        vertices = corners[shared].reshape(-1)
-        parts = weighted[shared].reshape(-1, 3)
-        axes = (np.bincount(vertices, parts[:, axis], len(points)) for axis in range(3))
-        sums = np.stack([np.asarray(axis, np.float64) for axis in axes], axis=1)
+        vertices = corners[shared].T.reshape(-1)
+        parts = facing[:, None, shared] * angles[:, shared]
+        sums = np.stack([np.bincount(vertices, part.reshape(-1), len(points)) for part in parts])
+        normal, length = _unit(sums.astype(np.float64, copy=False))
         mine = np.flatnonzero(groups == mask)
-        found = sums[corners[mine]]
-        # Faces back to back cancel: each keeps its own.
-        whole = np.einsum("ijk,ijk->ij", found, found) > 1e-12
-        out[mine] = np.where(whole[:, :, None], _unit(found), out[mine])
-    return np.ascontiguousarray(out.reshape(-1, 3), np.float32)
+        at = corners[mine]
+        found = np.ascontiguousarray(normal.T, np.float32)[at]
+        whole = length > _CANCELLED  # faces back to back cancel: each keeps its own
+        out[mine] = found if whole.all() else np.where(whole[at][:, :, None], found, out[mine])
+    return out.reshape(-1, 3)
 
 
-def _face_vectors(points: Floats, corners: Corners) -> Doubles:
-    a, b, c = (points[corners[:, k]].astype(np.float64) for k in range(3))
-    return np.cross(b - a, c - a).astype(np.float64)
+def _cross(a: Doubles, b: Doubles) -> Doubles:
+    """Of vectors (3, k)."""
+    x, y, z = a
+    u, v, w = b
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u])
 
 
-def _angles(points: Floats, corners: Corners) -> Doubles:
-    """The angle of each triangle at each corner, (f, 3), radians; 0 beside an edge of no length."""
-    place = points[corners].astype(np.float64)
-    there, back = np.roll(place, -1, axis=1) - place, np.roll(place, 1, axis=1) - place
-    sine = np.linalg.norm(np.cross(there, back), axis=2)
-    return np.asarray(np.arctan2(sine, np.einsum("ijk,ijk->ij", there, back)))
+def _dot(a: Doubles, b: Doubles) -> Doubles:
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-def _unit(vectors: Doubles) -> Doubles:
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    up = np.broadcast_to((0.0, 0.0, 1.0), vectors.shape)
-    return np.where(length > 0.0, vectors / np.where(length > 0.0, length, 1.0), up)
+def _unit(vectors: Doubles) -> tuple[Doubles, Doubles]:
+    """Vectors (3, k) at length 1, +Z for those of none, and their lengths (k,)."""
+    length = np.sqrt(_dot(vectors, vectors))
+    none = length == 0.0
+    if none.any():
+        vectors = np.where(none, ((0.0,), (0.0,), (1.0,)), vectors)
+    return vectors / np.where(none, 1.0, length), length

@@ -140,9 +140,7 @@ def _bounds(
     return value.astype(np.float32), state.astype(np.uint8)
 
 
-def flattest(
-    codes: npt.NDArray[Any], spread: npt.NDArray[Any], most: int
-) -> npt.NDArray[np.intp]:
+def flattest(codes: npt.NDArray[Any], spread: npt.NDArray[Any], most: int) -> npt.NDArray[np.intp]:
     """Which at most ``most`` of n pixels to recover a response from.
 
     ``codes`` (n, p, c) as shares, ``spread`` (n) how much each differs from its neighbours. They
@@ -156,9 +154,7 @@ def flattest(
     return np.concatenate(chosen)
 
 
-def noise(
-    codes: Sequence[npt.NDArray[Any]], pictures: Sequence[Exposed], light: Light
-) -> Floats:
+def noise(codes: Sequence[npt.NDArray[Any]], pictures: Sequence[Exposed], light: Light) -> Floats:
     """Standard deviation of codes, as a share of the range, at ``_LEVELS`` levels of it.
 
     ``codes``: (n, c) of each picture, ``light`` (n, c) merged from them. By the median of the
@@ -201,9 +197,7 @@ def with_tolerance(picture: Exposed, sigma: Floats) -> Exposed:
     return Exposed(picture.exposure, light, picture.weight, wide.astype(np.float32))
 
 
-def departs(
-    code: npt.NDArray[Any], picture: Exposed, light: Light
-) -> npt.NDArray[np.bool_]:
+def departs(code: npt.NDArray[Any], picture: Exposed, light: Light) -> npt.NDArray[np.bool_]:
     """Where a picture, (..., c), differs from the merged ``light`` beyond noise, (...).
 
     Something moved, or the camera did; that is not mended. Raises HdrusdError without tolerance.

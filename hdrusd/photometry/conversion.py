@@ -98,8 +98,8 @@ def to_eulumdat(file: IesFile | EulumdatFile, place: SourceRef, report: Report) 
         date=text.cut("ISSUEDATE", keys.get("ISSUEDATE") or keys.get("DATE") or ""),
         housing=sizes[:3],
         opening=(*sizes[:2], *[sizes[2]] * 4),
-        downward=_rounded(100.0 * down / flux) if flux > 0.0 else 0.0,
-        output_ratio=_rounded(100.0 * flux / lumens),
+        downward=round(100.0 * down / flux, 2) if flux > 0.0 else 0.0,
+        output_ratio=round(100.0 * flux / lumens, 2),
         conversion=1.0,
         tilt=0.0,
         lamps=(lamp,),
@@ -173,9 +173,8 @@ def _closed(luminaire: Luminaire, candela: Doubles) -> tuple[Doubles, Doubles]:
         return np.zeros(1), candela
     if planes[0] == -90.0:  # I(C) = I(180 - C)
         return 180.0 - planes[::-1], candela[::-1]
-    if planes[-1] in (90.0, 180.0, 270.0, 360.0) and planes[0] in (0.0, 90.0):
-        if (planes[0], planes[-1]) != (0.0, 270.0):
-            return planes, candela
+    if (planes[0], planes[-1]) in ((0.0, 90.0), (0.0, 180.0), (90.0, 270.0), (0.0, 360.0)):
+        return planes, candela
     return np.append(planes, 360.0), np.concatenate([candela, candela[:1]])
 
 

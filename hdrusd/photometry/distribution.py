@@ -87,7 +87,7 @@ def zonal_flux(luminaire: Luminaire) -> Doubles:
 def upward_share(luminaire: Luminaire) -> float | None:
     """ULR, the share of the flux above the horizontal; None without flux or a nadir (A, B)."""
     down, total = cumulative_flux(luminaire, [90.0, 180.0]).tolist()
-    return None if luminaire.type != "C" or total <= 0.0 else 1.0 - down / total
+    return None if luminaire.type != "C" or total <= 0.0 else max(1.0 - down / total, 0.0)
 
 
 def flux_code(luminaire: Luminaire) -> tuple[float, ...] | None:

@@ -96,15 +96,21 @@ class EulumdatFile:
             text = f"{len(self.lamps)} sets of lamps; the first, of {lumens:g} lm, is shown"
             report.add(Kind.ASSUMED, "profile-lamp-sets", SourceRef(place.file, 26), "", text)
         chosen = _stored(self.symmetry, len(self.planes), place)
+        planes = _stored_planes(self.symmetry, self.planes, chosen, self.at)
+        candela = self.candela
+        if self.symmetry == 0 and abs(planes[0]) < 0.01 and 0.01 < planes[-1] < 359.99:
+            # All round: 0 and 90 alone are no quadrant here.
+            planes = np.append(planes, 360.0)
+            candela = np.concatenate([candela, candela[:1]])
         keywords = {"MANUFAC": self.company, "LUMINAIRE": self.name, "LUMCAT": self.number}
         return checked(
             place,
             report,
             name=self.name or place.file.name,
             type="C",
-            planes=_stored_planes(self.symmetry, self.planes, chosen, self.at),
+            planes=planes,
             angles=self.angles,
-            candela=self.candela,
+            candela=candela,
             factor=self.factor,
             lumens=None if self.lamps[0].count < 0.0 else self.lamps[0].lumens,
             opening=self._opening(),

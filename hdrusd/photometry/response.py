@@ -152,9 +152,9 @@ def debevec97(
 
     ``shares`` (n, p): codes of n pixels in p pictures as shares of the range; ``exposures`` (p).
     Equation 3 is linear in ln g and ln E. Each pixel's ln E is the weighted mean of its row and
-    taken out beforehand, so that KNOTS unknowns are left, solved by the singular value
-    decomposition; a code between knots counts for both. Raises HdrusdError where too few codes
-    are seen.
+    taken out beforehand, so that KNOTS unknowns are left, and ln g of the middle is held at 0;
+    solved by the normal equations. A code between knots counts for both. Raises HdrusdError
+    where too few codes are seen.
     """
     z = np.asarray(shares, np.float64)
     weight = hat(z)
@@ -179,9 +179,11 @@ def debevec97(
     matrix[each, low.ravel() + 1] += part.ravel()
     matrix *= weight.reshape(-1, 1)
     wanted = (weight * (times - (share * times).sum(axis=1, keepdims=True))).ravel()
-    seen = np.sqrt(max(np.count_nonzero(weight) / KNOTS, 1.0))
-    both = np.concatenate([matrix / seen, smoothness * _bend(np.arange(KNOTS))])
-    curve = np.linalg.lstsq(both, np.concatenate([wanted / seen, np.zeros(KNOTS - 2)]))[0]
+    seen = max(np.count_nonzero(weight) / KNOTS, 1.0)
+    bend = smoothness * _bend(np.arange(KNOTS))
+    normal = matrix.T @ matrix / seen + bend.T @ bend
+    normal[MIDDLE, MIDDLE] += 1.0
+    curve = np.linalg.solve(normal, matrix.T @ wanted / seen)
     left = matrix @ curve - wanted
     spread = float(np.sqrt((left * left).sum() / square.sum()))
     return _settle(np.exp(curve - curve[MIDDLE])), spread

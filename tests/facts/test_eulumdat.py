@@ -48,6 +48,16 @@ def test_planes_of_a_symmetry(symmetry: int) -> None:
         assert lamp.value(c, 30.0) == pytest.approx(wanted, rel=1e-9), c
 
 
+@pytest.mark.parametrize("planes", [(0, 90), (0, 180), (0, 30), (0, 30, 200)])
+def test_planes_without_symmetry_go_all_round(planes: Sequence[float]) -> None:
+    rows = [[100.0 * (1 + index)] * len(GAMMA) for index in range(len(planes))]
+    lamp = ldt(ldt_text(rows, symmetry=0, planes=planes))
+    for c, row in zip(planes, rows, strict=True):
+        assert lamp.value(c, 30.0) == row[0]
+    between = (planes[-1] + 360.0) / 2.0
+    assert lamp.value(between, 30.0) == pytest.approx((rows[-1][0] + rows[0][0]) / 2.0)
+
+
 @pytest.mark.parametrize(
     ("symmetry", "wanted"),
     [

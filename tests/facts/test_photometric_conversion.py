@@ -57,8 +57,7 @@ def shines_alike(one: Document, other: Document) -> None:
         gamma = np.tile(source.angles, len(source.planes))
         first, second = a.value(planes, gamma), b.value(planes, gamma)
         assert np.abs(first - second).max() <= SEVEN * peak
-    assert b.flux() == pytest.approx(a.flux(), abs=1.0 if a.flux() < 1e6 else SEVEN * a.flux())
-    assert b.flux() == pytest.approx(a.flux(), rel=2 * SEVEN)
+    assert b.flux() == pytest.approx(a.flux(), rel=2 * SEVEN)  # 1 lm of 500,000
 
 
 WORDS_OF_FILES = st.text(
@@ -85,6 +84,8 @@ def ies_files(draw: st.DrawFn) -> IesFile:
     planes, angles = draw(planes_and_angles())
     count = len(planes) * len(angles)
     candela = draw(st.lists(CANDELA, min_size=count, max_size=count))
+    if planes[-1] == 360.0:  # which is plane 0 again
+        candela[-len(angles) :] = candela[: len(angles)]
     keys = st.sampled_from(["TEST", "MANUFAC", "LUMINAIRE", "OWN", "OTHER"])
     tilt = Tilt(1.0, np.array([0.0, 90.0]), np.array([draw(st.floats(0.5, 1.0)), 1.0]))
     return IesFile(
@@ -242,13 +243,13 @@ def test_length_lies_along_c_0_in_lm_63_and_along_c_90_in_eulumdat() -> None:
 def test_what_eulumdat_says_of_an_absolute_file() -> None:
     made = to_eulumdat(parse(ies_text().encode()), IES, Report())
     assert (made.lamps[0].count, made.output_ratio, made.downward) == (-1.0, 100.0, 100.0)
-    assert made.lamps[0].lumens == pytest.approx(1127.3027, rel=1e-6)
+    assert made.lamps[0].lumens == pytest.approx(1127.302726, rel=3e-6)
     assert made.symmetry == 4
     assert made.planes.tolist() == list(range(0, 360, 45))
     relative = to_eulumdat(parse(ies_text(lumens=2000.0).encode()), IES, Report())
     assert relative.lamps[0].count == 1.0
     assert relative.candela.tolist() == (np.array(QUADRANT) / 2).tolist()
-    assert relative.output_ratio == pytest.approx(56.365136, rel=1e-6)
+    assert relative.output_ratio == 56.37
 
 
 def test_lm_63_is_written_as_of_2002() -> None:

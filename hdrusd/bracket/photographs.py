@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -12,11 +13,15 @@ import numpy as np
 import numpy.typing as npt
 import OpenImageIO as oiio
 
-from hdrusd.errors import InputError
+from hdrusd.errors import InputError, SourceRef
 from hdrusd.images import check_size
+from hdrusd.report import Kind, Report
 
 #: Names under which OpenImageIO gives what Exif calls PhotographicSensitivity.
 _SPEEDS = ("Exif:PhotographicSensitivity", "Exif:ISOSpeedRatings", "Exif:ISOSpeed")
+
+#: No exposure is less than this, nor more than its inverse.
+_LEAST = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +129,54 @@ class Photograph:
     def _number(self, name: str) -> float | None:
         said = self._value(name)
         return said if said is not None and 0.0 < said < 1e9 else None
+
+
+@dataclass(frozen=True, slots=True)
+class Stated:
+    """Exposures of all pictures: ``values`` in ``unit``; ``absolute`` where they are t S / N^2."""
+
+    values: tuple[float, ...]
+    unit: str
+    absolute: bool
+
+
+def stated_exposures(
+    pictures: Sequence[Photograph], given: Sequence[float] | None, report: Report
+) -> Stated:
+    """The exposures that the files state, or those that are ``given``, one a picture.
+
+    Aperture or speed that no file states are taken for the same in all, which is a finding.
+    Raises InputError where a picture lacks what others state.
+    """
+    first = pictures[0].path
+    if given is not None:
+        if len(given) != len(pictures):
+            raise InputError(first, f"{len(given)} exposures for {len(pictures)} pictures")
+        if not all(math.isfinite(value) and _LEAST < value < 1.0 / _LEAST for value in given):
+            raise InputError(first, "exposures: want numbers above 0")
+        return Stated(tuple(float(value) for value in given), "relative, as given", False)
+    found = [picture.exposure() for picture in pictures]
+    names = {"ExposureTime": "time", "FNumber": "aperture", "PhotographicSensitivity": "speed"}
+    lacking = []
+    for exif, name in names.items():
+        without = [p.path for p, e in zip(pictures, found, strict=True) if getattr(e, name) is None]
+        if name != "time" and len(without) == len(pictures):
+            lacking.append(exif)
+        elif without:
+            others = f" (nor in {len(without) - 1} others)" if len(without) > 1 else ""
+            raise InputError(without[0], f"no {exif} in its Exif{others}; want --ev or --exposures")
+    if lacking:
+        text = f"no {' and '.join(lacking)} in any picture; taken for the same in all"
+        report.add(Kind.ASSUMED, "bracket-aperture", SourceRef(first), "", text)
+    values = [(e.time or 0.0) * (e.speed or 1.0) / (e.aperture or 1.0) ** 2 for e in found]
+    for picture, value in zip(pictures, values, strict=True):
+        if not _LEAST < value < 1.0 / _LEAST:
+            raise InputError(picture.path, f"an exposure of {value:.3g}; want --ev or --exposures")
+    apertures = {round(e.aperture, 3) for e in found if e.aperture is not None}
+    if len(apertures) > 1:
+        text = "apertures differ; focus and shading at the edges differ with them"
+        report.add(Kind.ASSUMED, "bracket-aperture", SourceRef(first), "", text)
+    return Stated(tuple(values), "s ISO / f-number^2", not lacking)
 
 
 def oriented(picture: npt.NDArray[Any], orientation: int) -> npt.NDArray[Any]:
