@@ -80,7 +80,7 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Turn SOURCE (.3ds .gltf .glb .obj .osg .osgt) into a photometric stage OUTPUT.usda.
+    """Turn SOURCE (.3ds .dae .flt .gltf .glb .obj .osg .osgt) into a photometric stage OUTPUT.usda.
 
     Beside OUTPUT stand its layers (geometry, look, photometry) and textures.
     """

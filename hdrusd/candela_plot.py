@@ -91,6 +91,8 @@ def _dense(angles: np.ndarray, candela: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 def _draw_polar(panel: PolarAxes, drawn: Sequence[Section], nadir: bool, unit: str) -> None:
     """Nadir at the bottom, C 0 and C 90 to the right; the aim of types A and B at the top."""
+    from matplotlib.ticker import MaxNLocator
+
     panel.set_theta_zero_location("S" if nadir else "N")
     panel.set_theta_direction(1 if nadir else -1)
     for section, colour, dashes in zip(drawn, _COLOURS, _DASHES, strict=True):
@@ -105,11 +107,12 @@ def _draw_polar(panel: PolarAxes, drawn: Sequence[Section], nadir: bool, unit: s
     marks = np.arange(0.0, 360.0, 30.0)
     names = [f"{mark if mark <= 180.0 else 360.0 - mark:.0f}°" for mark in marks]
     panel.set_thetagrids(marks, names)
-    panel.set_rlim(0.0)
-    panel.locator_params(axis="y", nbins=5)
+    top = max(float(section.candela.max()) for section in drawn) or 1.0
+    panel.set_rticks([r for r in MaxNLocator(5).tick_values(0.0, top) if 0.0 < r <= 1.1 * top])
+    panel.set_rlim(0.0, 1.1 * top)
     panel.set_rlabel_position(_darkest(drawn))
     panel.tick_params(axis="y", labelsize=7.5)
-    sides = "C 0 and C 90 to the right" if nadir else "right and top to the right"
+    sides = "C 0 and C 90 to the right" if nadir else "H right and V up to the right"
     panel.set_title(f"Luminous intensity ({unit}), {sides}", fontsize=9.0, pad=12.0)
 
 
@@ -138,6 +141,8 @@ def _draw_plain(panel: Axes, drawn: Sequence[Section], nadir: bool, unit: str) -
     limit = min(180.0, max(30.0 * np.ceil(max(ends) / 30.0), 30.0))
     panel.set_xlim(-limit, limit)
     panel.set_xticks(np.linspace(-limit, limit, 13 if limit % 90.0 == 0.0 else 9))
+    if not any(section.candela.any() for section in drawn):
+        panel.set_ylim(0.0, 1.0)
     panel.set_ylim(0.0)
     panel.spines[["top", "right"]].set_visible(False)
     panel.set_xlabel("Angle γ from the nadir (°)" if nadir else "Angle from the aim (°)")

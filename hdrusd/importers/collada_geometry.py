@@ -160,8 +160,10 @@ class GeometryReader:
             i for i in shared if i is not position
         ]
         numbers = faces.corners[:, vertex.offset]
-        used = np.unique(numbers)
-        compact = np.searchsorted(used, numbers).astype(np.int32)
+        mask = np.zeros(len(points), bool)
+        mask[numbers] = True
+        used = np.flatnonzero(mask)
+        compact = (np.cumsum(mask, dtype=np.int32) - np.int32(1))[numbers]
         attribute = _Attributes(document, self._sources, place, name, faces.corners, used)
         normals = attribute.read([i for i in rest if i.semantic == "NORMAL"][:1], 3, 3)
         if normals is not None:

@@ -19,7 +19,7 @@ from hdrusd.photometry.profile import profile_angles
 ZONES = (0.0, 30.0, 60.0, 90.0, 180.0)
 
 #: Steps of the sum over a sphere about the aim of types A and B, degrees.
-_STEP = 0.25
+_STEP = 0.5
 
 #: Degrees; bounds nearer than this to an angle of the file are there.
 _SAME = 1e-6
@@ -46,7 +46,7 @@ def peak(luminaire: Luminaire) -> Peak:
 def cumulative_flux(luminaire: Luminaire, angles: npt.ArrayLike) -> Doubles:
     """Lumens within cones of half ``angles``, degrees (k,), about the nadir or the aim.
 
-    Type C in closed form; types A and B summed over steps of 0.25 degrees and scaled to
+    Type C in closed form; types A and B summed over steps of half a degree and scaled to
     ``Luminaire.flux``.
     """
     bounds = np.asarray(angles, np.float64)
@@ -86,8 +86,10 @@ def zonal_flux(luminaire: Luminaire) -> Doubles:
 
 def upward_share(luminaire: Luminaire) -> float | None:
     """ULR, the share of the flux above the horizontal; None without flux or a nadir (A, B)."""
+    if luminaire.type != "C":
+        return None
     down, total = cumulative_flux(luminaire, [90.0, 180.0]).tolist()
-    return None if luminaire.type != "C" or total <= 0.0 else max(1.0 - down / total, 0.0)
+    return None if total <= 0.0 else max(1.0 - down / total, 0.0)
 
 
 def flux_code(luminaire: Luminaire) -> tuple[float, ...] | None:
@@ -96,9 +98,11 @@ def flux_code(luminaire: Luminaire) -> tuple[float, ...] | None:
     Flux in the solid angles pi/2, pi and 3 pi/2 about the nadir to that of the lower half,
     that to all, and all to the lamps' (100 where their lumens are not stated). CIE 52-1982.
     """
+    if luminaire.type != "C":
+        return None
     cones = np.degrees(np.arccos([0.75, 0.5, 0.25, 0.0, -1.0]))
     *inner, down, total = cumulative_flux(luminaire, cones).tolist()
-    if luminaire.type != "C" or down <= 0.0:
+    if down <= 0.0:
         return None
     efficiency = total / luminaire.lumens if luminaire.lumens else 1.0
     return *(100.0 * flux / down for flux in inner), 100.0 * down / total, 100.0 * efficiency

@@ -59,7 +59,9 @@ def check_eulumdat(
     ):
         if stated != 0.0 and len(values) > 2 and not _has_step(values, stated):
             tell(
-                "angles", line, f"step {stated:g}, but {what} have another; want 0 for uneven ones"
+                "photometric-angles",
+                line,
+                f"step {stated:g}, but {what} have another; want 0 for uneven ones",
             )
     if file.angles[0] != 0.0 and file.angles[0] != 90.0:
         text = f"gamma starts at {file.angles[0]:g}; want 0"

@@ -59,31 +59,38 @@ def check_ies(file: IesFile, place: SourceRef, report: Report) -> None:
 
 
 def _check_head(file: IesFile, place: SourceRef, report: Report) -> None:
-    def tell(kind: Kind, line: int, text: str) -> None:
-        report.add(kind, "photometric-header", SourceRef(place.file, line), "", text)
+    told: dict[str, list[int]] = {}  # text -> first line, and how many there are
+
+    def tell(line: int, text: str) -> None:
+        told.setdefault(text, [line, 0])[1] += 1
 
     strict = file.edition >= 2002
     lines = file.head.splitlines()
     label = LABELS[file.edition]
     labelled = bool(lines) and lines[0].strip().upper().startswith("IES")
     if labelled and lines[0].rstrip() != label:
-        tell(Kind.INVALID, 1, f"label {lines[0].strip()!r}; want {label!r}")
+        tell(1, f"label {lines[0].strip()!r}; want {label!r}")
     for number, line in enumerate(lines[labelled:], start=1 + labelled):
         found = keyword(line)
         if strict and len(line) > _LINE:
-            tell(Kind.INVALID, number, f"{len(line)} characters; want at most {_LINE}")
+            tell(number, f"a line of more than {_LINE} characters")
         if found is None:
             if line.strip() and file.edition >= 1991:
-                tell(Kind.INVALID, number, "text without a keyword")
+                tell(number, "text without a keyword")
         elif not found[0]:
-            tell(Kind.INVALID, number, "a keyword without a name")
+            tell(number, "a keyword without a name")
         elif strict and found[0] not in KEYWORDS | {"MORE"} and not line.lstrip().startswith("[_"):
-            tell(Kind.INVALID, number, f"[{found[0]}] is not defined; want [_{found[0]}]")
+            tell(number, f"[{found[0]}] is not defined; want [_{found[0]}]")
+    for text, (line, count) in told.items():
+        text = text if count == 1 else f"{text}; so are {count} lines"
+        first = SourceRef(place.file, line)
+        report.add(Kind.INVALID, "photometric-header", first, "", text)
     if strict:
         for key in REQUIRED:
             if not file.keywords.get(key):
                 text = f"no [{key}], which LM-63-{file.edition} requires"
-                tell(Kind.MISSING, len(lines) + 1, text)
+                end = SourceRef(place.file, len(lines) + 1)
+                report.add(Kind.MISSING, "photometric-header", end, "", text)
 
 
 def _check_numbers(file: IesFile, report: Report) -> None:

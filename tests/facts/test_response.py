@@ -47,7 +47,7 @@ def recovered(
 
 
 def errors(found: Response, inverse: np.ndarray) -> np.ndarray:
-    """ln of recovered over true exposure, (3, n), up to the factor that is open."""
+    """Logarithm of recovered over true exposure, (3, n), up to the factor that is open."""
     truth = np.log(inverse[STATED] / inverse[MIDDLE])
     off = np.log(found.curves[:, STATED]) - truth
     return off - off.mean(axis=1, keepdims=True)

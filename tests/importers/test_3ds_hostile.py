@@ -178,7 +178,9 @@ def test_mutated_bytes_end_in_a_scene_or_an_input_error(
         begin = data.draw(st.integers(0, len(content) - 1))
         piece = data.draw(
             st.binary(min_size=1, max_size=4)
-            | st.sampled_from([b"\xff\xff", b"\0\0\xc0\x7f", b"\xff\xff\x7f\x7f", b"\0\0\0\0"])
+            | st.sampled_from(
+                [b"\xff\xff", b"\0\0\xc0\x7f", b"\1\0\x80\x7f", b"\xff\xff\x7f\x7f", b"\0\0\0\0"]
+            )
         )
         content[begin : begin + len(piece)] = piece
     try:
