@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +55,8 @@ def test_five_decades_come_back_within_five_percent(
     for off in decades(picture, LIGHT):
         assert len(off) > 1000
         assert abs(np.median(off)) < 0.02
-        assert np.mean(np.abs(off) < 0.05) > 0.95  # noise and rounding of single pixels
+        # Noise and rounding of single pixels, to which JPEG adds its own.
+        assert np.mean(np.abs(off) < 0.05) > (0.95 if suffix == ".png" else 0.9)
         assert np.sqrt(np.mean(off**2)) < 0.05
     assert report.codes() <= {"bracket-unheld"}
     assert said["response"]["method"] == response
@@ -120,11 +122,12 @@ def test_a_region_that_the_lamp_does_not_fill_is_told(tmp_path: Path) -> None:
 
 
 def test_the_camera_estimates_where_nothing_is_measured(tmp_path: Path) -> None:
-    files = write_bracket(tmp_path, LIGHT, suffix=".jpg")
+    light = np.repeat(LIGHT[..., 1:2], 3, axis=2)
+    files = write_bracket(tmp_path, light, suffix=".jpg")
     picture, said, report = merged(files)
     assert "bracket-camera" in report.codes()
     # Code 118 at stop 0: 64 s, f/4, ISO 100; 10/0.65 16 / 6400 cd/m2.
-    code = shoot(LIGHT, 0.0)
+    code = shoot(light, 0.0, seed=None)
     grey = np.abs(code.astype(int) - 118).max(axis=-1) <= 2
     found = np.median(luminance(picture[grey].astype(np.float64)))
     assert found == pytest.approx(10.0 / 0.65 * 16.0 / 6400.0, rel=0.03)
@@ -227,7 +230,10 @@ def test_what_moved_is_told(tmp_path: Path) -> None:
         write_photograph(files[i], shoot(moved, STOPS[i]), exif(STOPS[i]))
     report = merged(files)[2]
     (found,) = [finding for finding in report if finding.code == "bracket-ghost"]
-    assert "inside 80,4" in found.text or "inside 8" in found.text
+    box = re.search(r"from (\d+),(\d+) to (\d+),(\d+) ", found.text)
+    assert box is not None
+    # What is as bright as before inside of the patch does not depart.
+    assert np.all(np.abs(np.array(box.groups(), int) - [80, 40, 119, 69]) <= 3)
 
 
 def test_a_camera_that_moved_is_told(tmp_path: Path) -> None:
@@ -255,7 +261,7 @@ def test_what_no_exposure_holds_is_counted(tmp_path: Path) -> None:
     light = LIGHT.copy()
     light[:10, :10] = 1e8
     light[-10:, -10:] = 0.0
-    files = write_bracket(tmp_path, light)
+    files = write_bracket(tmp_path, light, seed=None)
     picture, said, report = merged(files, spot=measured(LIGHT, 100, 60, 4))
     texts = [finding.text for finding in report if finding.code == "bracket-unheld"]
     assert any(text.startswith("100 pixels") and "saturated in all" in text for text in texts)
@@ -355,7 +361,7 @@ def test_values_that_are_not_finite_are_one_line(tmp_path: Path) -> None:
         write_photograph(tmp_path / "b.tif", broken),
     ]
     with pytest.raises(InputError, match="not finite"):
-        merged(files, exposures=(1.0, 2.0), response="linear")
+        merged(files, exposures=(1.0, 2.0), response="linear", spot=Spot(9, 9, 0.0, 1.0))
 
 
 def test_files_that_are_no_pictures_are_one_line(tmp_path: Path) -> None:

@@ -282,8 +282,7 @@ def _merged(
     light = np.empty((height, width, channels), np.float32)
     state = np.empty((height, width), np.uint8)
     counts = np.zeros(len(pictures), np.int64)
-    box = np.array([width, height, -1, -1])
-    moved = 0
+    across, along = np.zeros(width, np.int64), np.zeros(height, np.int64)
     for start, stop in _strips(pictures[0], len(pictures)):
         codes = [picture.rows(start, stop) for picture in pictures]
         light[start:stop], held = merge(codes, tables)
@@ -293,20 +292,25 @@ def _merged(
             away = departs(code, table, light[start:stop])
             counts[i] += np.count_nonzero(away)
             anywhere |= away
-        down, right = np.nonzero(anywhere)
-        if len(down):
-            moved += len(down)
-            box[:2] = np.minimum(box[:2], [right.min(), down.min() + start])
-            box[2:] = np.maximum(box[2:], [right.max(), down.max() + start])
+        across += np.count_nonzero(anywhere, axis=0)
+        along[start:stop] = np.count_nonzero(anywhere, axis=1)
+    moved = int(across.sum())
     if moved > _MOVED * height * width:
         worst = pictures[int(counts.argmax())].path
+        (left, right), (up, down) = _most(across), _most(along)
         text = (
             f"{moved} pixels ({100.0 * moved / (height * width):.2g} %) differ between pictures "
-            f"beyond noise, most in this one, inside {box[0]},{box[1]} to {box[2]},{box[3]} of "
+            f"beyond noise, most in this one, from {left},{up} to {right},{down} of "
             "its rows: something moved, or the camera did; not corrected"
         )
         report.add(Kind.INVALID, "bracket-ghost", SourceRef(worst), "", text)
     return light, state
+
+
+def _most(counts: npt.NDArray[np.int64]) -> tuple[int, int]:
+    """Between which places all but 2 % of ``counts`` lie."""
+    share = np.cumsum(counts) / counts.sum()
+    return int(np.searchsorted(share, 0.01)), int(np.searchsorted(share, 0.99))
 
 
 def _lost(

@@ -81,10 +81,9 @@ def _check_head(file: IesFile, place: SourceRef, report: Report) -> None:
             tell(number, "a keyword without a name")
         elif strict and found[0] not in KEYWORDS | {"MORE"} and not line.lstrip().startswith("[_"):
             tell(number, f"[{found[0]}] is not defined; want [_{found[0]}]")
-    for text, (line, count) in told.items():
-        text = text if count == 1 else f"{text}; so are {count} lines"
-        first = SourceRef(place.file, line)
-        report.add(Kind.INVALID, "photometric-header", first, "", text)
+    for text, (first, count) in told.items():
+        whole = text if count == 1 else f"{text}; {count} lines of that kind"
+        report.add(Kind.INVALID, "photometric-header", SourceRef(place.file, first), "", whole)
     if strict:
         for key in REQUIRED:
             if not file.keywords.get(key):
