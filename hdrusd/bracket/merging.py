@@ -33,6 +33,7 @@ from hdrusd.photometry.bracketing import (
     merge,
     noise,
     ratio,
+    steady,
     with_tolerance,
 )
 from hdrusd.photometry.response import (
@@ -83,9 +84,14 @@ class Bracket:
 
 @dataclass(slots=True)
 class _Grid:
-    """The pixels that are kept: codes a picture (n, c), and how much they differ around, (n)."""
+    """The pixels that are kept.
+
+    ``codes``: (n, c) a picture, and all as ``shares`` (n, p, c) of the range; ``spread``: how much
+    they differ from their neighbours, (n).
+    """
 
     codes: list[npt.NDArray[Any]]
+    shares: npt.NDArray[np.float64]
     spread: npt.NDArray[np.float64]
 
 
@@ -99,11 +105,11 @@ def merge_bracket(bracket: Bracket, report: Report) -> dict[str, Any]:
     with ExitStack() as stack:
         pictures = [stack.enter_context(Photograph(file)) for file in bracket.files]
         stated = stated_exposures(pictures, bracket.exposures, report)
-        bracket.calibration.check(stated, SourceRef(bracket.output))
         order = sorted(range(len(pictures)), key=lambda i: stated.values[i])
         pictures = [pictures[i] for i in order]
         values = [stated.values[i] for i in order]
         _agree(pictures, values, report)
+        bracket.calibration.check(stated, SourceRef(bracket.output))
         grid = _look(pictures)
         response = response or _recovered(bracket, pictures, values, grid)
         if len(response.curves) == 3 and pictures[0].shape[2] == 1:
@@ -198,11 +204,12 @@ def _strips(picture: Photograph, together: int) -> Iterator[tuple[int, int]]:
 
 
 def _look(pictures: Sequence[Photograph]) -> _Grid:
-    """A grid of pixels of every picture, read one after another."""
+    """A grid of pixels of every picture, read one after another, without those that moved."""
     height, width, channels = pictures[0].shape
     step = max(1, math.ceil(math.sqrt(height * width / _GRID)))
     right = np.arange(step // 2, width, step)
-    grid = _Grid([], np.zeros(0))
+    kept: list[npt.NDArray[Any]] = []
+    spread = np.zeros(1)
     for picture in pictures:
         codes, spreads = [], []
         for start, stop in _strips(picture, 1):
@@ -218,10 +225,13 @@ def _look(pictures: Sequence[Photograph]) -> _Grid:
                 away = np.maximum(away, np.abs(strip[beside] - middle).max(axis=-1))
             codes.append(strip[np.ix_(down, right)].reshape(-1, channels))
             spreads.append(away.ravel() / picture.top)
-        grid.codes.append(np.concatenate(codes))
-        spread = np.concatenate(spreads)
-        grid.spread = np.maximum(grid.spread, spread) if grid.spread.size else spread
-    return grid
+        kept.append(np.concatenate(codes))
+        spread = np.maximum(spread, np.concatenate(spreads))
+    shares = np.stack([code / p.top for code, p in zip(kept, pictures, strict=True)], axis=1)
+    still = steady(shares)
+    if still.mean() < 0.5:  # then nobody can say what moved
+        still[:] = True
+    return _Grid([code[still] for code in kept], shares[still], spread[still])
 
 
 def _recovered(
@@ -229,12 +239,9 @@ def _recovered(
 ) -> Response:
     """The response of these very pictures, written where it is asked for."""
     method = str(bracket.response)
-    shares = np.stack(
-        [codes / picture.top for codes, picture in zip(grid.codes, pictures, strict=True)], axis=1
-    )
-    chosen = flattest(shares, grid.spread, _PIXELS[method])
+    chosen = flattest(grid.shares, grid.spread, _PIXELS[method])
     try:
-        response = recover(shares[chosen], values, method, bracket.smoothness)
+        response = recover(grid.shares[chosen], values, method, bracket.smoothness)
     except HdrusdError as problem:
         raise InputError(pictures[0].path, str(problem)) from problem
     if bracket.response_out is not None:
@@ -256,11 +263,7 @@ def _judged(
     ):
         text = "no pixel is between dark and saturated in any picture; want other exposures"
         raise InputError(pictures[0].path, text)
-    flat = flattest(
-        np.stack([c / t.top for c, t in zip(grid.codes, tables, strict=True)], axis=1),
-        grid.spread,
-        len(grid.spread) // 2,
-    )
+    flat = flattest(grid.shares, grid.spread, len(grid.spread) // 2)
     codes = [code[flat] for code in grid.codes]
     for i in range(1, len(tables)):
         times = ratio(codes[i], codes[i - 1], tables[i], tables[i - 1])

@@ -140,6 +140,33 @@ def _bounds(
     return value.astype(np.float32), state.astype(np.uint8)
 
 
+def steady(codes: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    """Which of n pixels show the same light in all pictures, whatever the response is.
+
+    ``codes`` (n, p, c) as shares, pictures rising in exposure. A code in one picture comes with
+    one code in the next, so a pixel that is far from the median of its like saw something move.
+    """
+    kept = np.ones(len(codes), np.bool_)
+    for k in range(codes.shape[1] - 1):
+        for channel in range(codes.shape[2]):
+            group = np.rint(codes[:, k, channel] * 255.0).astype(np.int64)
+            value = codes[:, k + 1, channel]
+            away = np.abs(value - _medians(group, value)[group])
+            usual = _medians(group, away)[group]
+            many = np.bincount(group, minlength=256)[group] >= 5
+            kept &= ~many | (away <= 6.0 * usual + 3.0 / 255.0)
+    return kept
+
+
+def _medians(group: npt.NDArray[np.int64], value: npt.NDArray[Any]) -> Floats:
+    """The lower median of ``value`` (n) in each of 256 groups; 0 in empty ones."""
+    ordered = value[np.lexsort((value, group))]
+    count = np.bincount(group, minlength=256)
+    first = np.cumsum(count) - count
+    middle = np.minimum(first + np.maximum(count - 1, 0) // 2, len(value) - 1)
+    return np.where(count > 0, ordered[middle], 0.0)
+
+
 def flattest(codes: npt.NDArray[Any], spread: npt.NDArray[Any], most: int) -> npt.NDArray[np.intp]:
     """Which at most ``most`` of n pixels to recover a response from.
 

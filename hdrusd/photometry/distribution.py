@@ -24,6 +24,9 @@ _STEP = 0.5
 #: Degrees; bounds nearer than this to an angle of the file are there.
 _SAME = 1e-6
 
+#: Degrees between which nothing ends: nadir and zenith, and once round the aim.
+_FALL, _TURN = (0.0, 180.0), (-180.0, 180.0)
+
 #: Share of the peak by which two sides of a symmetric luminaire may differ.
 ALIKE = 1e-3
 
@@ -129,23 +132,23 @@ def sections(luminaire: Luminaire) -> tuple[Section, Section]:
     if luminaire.type == "C":
         return _through_nadir(luminaire, 0.0), _through_nadir(luminaire, 90.0)
     planes = luminaire.unfolded()[0]
-    across = _framed(planes, luminaire.value(planes, 0.0))
+    across = _framed(planes, luminaire.value(planes, 0.0), _TURN)
     return (
         Section("H (V = 0)", *across),
-        Section("V (H = 0)", *_framed(angles, luminaire.value(0.0, angles))),
+        Section("V (H = 0)", *_framed(angles, luminaire.value(0.0, angles), _TURN)),
     )
 
 
 def _through_nadir(luminaire: Luminaire, plane: float) -> Section:
     name = f"C {plane:g}-{plane + 180.0:g}"
-    x, y = _framed(luminaire.angles, luminaire.value(plane, luminaire.angles))
-    _, far = _framed(luminaire.angles, luminaire.value(plane + 180.0, luminaire.angles))
+    x, y = _framed(luminaire.angles, luminaire.value(plane, luminaire.angles), _FALL)
+    _, far = _framed(luminaire.angles, luminaire.value(plane + 180.0, luminaire.angles), _FALL)
     return Section(name, np.concatenate([-x[::-1], x]), np.concatenate([far[::-1], y]))
 
 
-def _framed(x: Doubles, y: Doubles) -> tuple[Doubles, Doubles]:
-    """Nodes and values with the dark beyond their ends; nadir and zenith are no ends."""
-    ends = tuple(int(abs(float(end)) not in (0.0, 180.0)) for end in (x[0], x[-1]))
+def _framed(x: Doubles, y: Doubles, whole: tuple[float, float]) -> tuple[Doubles, Doubles]:
+    """Nodes and values with the dark beyond their ends, but for where a turn is ``whole``."""
+    ends = int(x[0] != whole[0]), int(x[-1] != whole[1])
     return np.pad(x, ends, mode="edge"), np.pad(y, ends)
 
 

@@ -44,9 +44,6 @@ SMOOTHNESS = 16.0
 #: by which each turn is smoothed.
 _TURNS, _SETTLED, _SMOOTHED = 5000, 1e-7, 32.0
 
-#: How often pixels that moved are sifted out.
-_SIFTED = 2
-
 #: A curve is no curve beyond this many values.
 MOST_VALUES = 65536
 
@@ -202,7 +199,7 @@ def robertson03(shares: npt.ArrayLike, exposures: npt.ArrayLike) -> tuple[Floats
 
     Not in the paper: each turn is smoothed as in equation 3 of Debevec and Malik, weighted by how
     often codes are seen. Without, exposures in equal steps leave ripples of that period open
-    (Grossberg and Nayar 2003), which h^2 as a weight hardly dampens: 10 % and more at 2 stops.
+    (Grossberg and Nayar 2002), which h^2 as a weight hardly dampens: 10 % and more at 2 stops.
     """
     z = np.asarray(shares, np.float64)
     codes = np.rint(z * (KNOTS - 1)).astype(np.int64)
@@ -273,42 +270,23 @@ def _settle(curve: Floats) -> Floats:
     return np.asarray(rising / rising[MIDDLE])
 
 
-def _steady(shares: Floats, exposures: Floats, curve: Floats) -> npt.NDArray[np.bool_]:
-    """Which of n pixels one curve explains in all pictures, as far as noise goes."""
-    knots = np.arange(KNOTS)
-    logs = np.log(np.maximum(curve, 1e-12))
-    slope = np.maximum(np.gradient(logs), 1e-4)
-    z = shares * (KNOTS - 1)
-    weight = hat(shares)
-    light = np.interp(z, knots, logs) - np.log(exposures)
-    mean = (weight * light).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-12)
-    away = np.abs(light - mean[:, None]) / np.interp(z, knots, slope) * (weight > 0.0)
-    most = away.max(axis=1)
-    usual = most[np.count_nonzero(weight, axis=1) >= 2]
-    return np.asarray(most <= 4.0 * (np.median(usual) if len(usual) else 0.0) + 2.0)
-
-
 def recover(
     codes: npt.ArrayLike, exposures: npt.ArrayLike, method: str, smoothness: float = SMOOTHNESS
 ) -> Response:
     """The response of all channels from ``codes`` (n, p, 1 or 3), as shares of the range.
 
-    ``method``: "debevec" or "robertson". Pixels of what moved are left out: those that the first
-    curves cannot explain, by codes. Raises HdrusdError.
+    ``method``: "debevec" or "robertson". Raises HdrusdError.
     """
     shares = np.asarray(codes, np.float64)
     values = np.asarray(exposures, np.float64)
     curves, spreads = [], []
     for channel in range(shares.shape[2]):
         one = shares[..., channel]
-        for turn in range(_SIFTED + 1):
-            curve, spread = (
-                robertson03(one, values)
-                if method == "robertson"
-                else debevec97(one, values, smoothness)
-            )
-            if turn < _SIFTED:
-                one = one[_steady(one, values, curve)]
+        curve, spread = (
+            robertson03(one, values)
+            if method == "robertson"
+            else debevec97(one, values, smoothness)
+        )
         curves.append(curve)
         spreads.append(spread)
     return Response(method, np.array(curves), float(np.sqrt(np.mean(np.square(spreads)))))

@@ -22,6 +22,7 @@ from hdrusd.photometry.bracketing import (
     merge,
     noise,
     ratio,
+    steady,
     with_tolerance,
 )
 from hdrusd.photometry.response import bell, linear_response, srgb_response
@@ -148,6 +149,19 @@ def test_flat_pixels_of_all_levels_are_chosen() -> None:
     assert np.histogram(level[chosen], 8, (0.0, 1.0))[0].min() >= 48
     assert spread[chosen].mean() < 0.15
     assert len(flattest(level[:1, None, None], spread[:1], 512)) == 1
+
+
+def test_pixels_that_moved_are_sifted_whatever_the_response() -> None:
+    rng = np.random.default_rng(6)
+    light = rng.uniform(0.05, 1.0, (4000, 1))
+    codes = np.stack([np.sqrt(light * h).clip(0.0, 1.0) for h in (0.1, 0.3, 0.9)], axis=1)
+    codes += rng.normal(0.0, 1.0 / 255.0, codes.shape)
+    assert steady(codes.clip(0.0, 1.0)).mean() > 0.97
+    codes[:200, 1:] = np.sqrt(0.5 * np.array([0.3, 0.9]))[None, :, None]
+    kept = steady(codes.clip(0.0, 1.0))
+    changed = np.abs(np.sqrt(light[:200, 0]) - np.sqrt(0.5)) > 0.15
+    assert not kept[:200][changed].any()
+    assert kept[200:].mean() > 0.95
 
 
 def test_discs() -> None:

@@ -97,6 +97,12 @@ def test_zones_of_types_a_and_b_are_about_the_aim(type: str) -> None:
     assert upward_share(window) is flux_code(window) is nadir_luminance(window) is None
 
 
+@pytest.mark.parametrize("type", ["A", "B"])
+def test_a_window_that_begins_at_the_aim(type: str) -> None:
+    above = ies(ies_text(np.full((2, 2), 50.0), planes=(-10, 10), angles=(0, 6), type=type))
+    assert [fan(section, 0.5) for section in sections(above)] == [20.0, 6.0]
+
+
 def curve(candela: list[float], angles: list[float], other: list[float] | None = None) -> Luminaire:
     rows = [candela, candela if other is None else other]
     return ies(ies_text(rows, planes=(0, 180), angles=angles))

@@ -271,10 +271,10 @@ def test_a_whole_turn_ends_at_360(end: float) -> None:
     shines_alike(file, made)
 
 
-TRUTH = sorted((Path(__file__).parents[2] / "samples/street/luminaires").glob("*.[il][ed][st]"))
+STREET = sorted((Path(__file__).parents[2] / "samples/street/luminaires").glob("*.[il][ed][st]"))
 
 
-@pytest.mark.parametrize("path", TRUTH, ids=lambda path: path.name)
+@pytest.mark.parametrize("path", STREET, ids=lambda path: path.name)
 def test_the_street_luminaires_both_ways(path: Path) -> None:
     file = parse(path.read_bytes())
     assert said(parse(write(file))) == said(file)
@@ -283,4 +283,14 @@ def test_the_street_luminaires_both_ways(path: Path) -> None:
 
 
 def test_samples_are_there() -> None:
-    assert len(TRUTH) == 3
+    assert len(STREET) == 3
+
+
+def test_the_truth_files_both_ways(testdata: Path) -> None:
+    files = sorted((testdata / "truth" / "photometry").iterdir())
+    assert len(files) >= 5
+    for path in files:
+        file = parse(path.read_bytes())
+        assert said(parse(write(file))) == said(file)
+        for convert in (to_ies, to_eulumdat):
+            shines_alike(file, parse(write(convert(file, LDT, Report()))))
