@@ -56,7 +56,8 @@ def eye_options(function: F) -> F:
         click.option(
             "--state-in",
             type=FILE,
-            help="Start with the state of the eye in this .json or EXR frame.",
+            help="Start with the state of the eye in this .json or EXR frame: that of the latest "
+            "frame before the first one, else the last.",
         ),
         click.option(
             "--warm-up",

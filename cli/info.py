@@ -41,7 +41,8 @@ def _frame(file: Path) -> dict[str, Any]:
     facts: dict[str, Any] = {"size": f"{rgb.shape[1]} x {rgb.shape[0]}"}
     stated = "whiteLuminance" in header
     facts["unit"] = "cd/m2" if stated else "not stated (no whiteLuminance)"
-    facts |= {name: float(f"{value:.6g}") for name, value in asdict(statistics(rgb)).items()}
+    measured = asdict(statistics(rgb))
+    facts |= {name: float(f"{v:.6g}") for name, v in measured.items() if v is not None}
     facts |= {k: v for k, v in header.items() if k.startswith("hdrusd:")}
     return facts
 

@@ -198,12 +198,14 @@ def command(stage: Path, output: str, **options: Any) -> None:
     report = Report()
     job = _job(stage, output, options)
     started, written, skipped = time.perf_counter(), [], 0
+    in_time = False
     total = len(job.times) if job.times is not None else 1
     with click.progressbar(
         length=total, label=stage.name, file=sys.stderr, hidden=not sys.stderr.isatty()
     ) as bar:
         for frame in render_sequence(create_context(), job, report):
             written += [str(file) for file in frame.files if not frame.skipped]
+            in_time |= frame.moment is not None and frame.moment.state is not None
             skipped += frame.skipped
             bar.update(1)
     document = report.as_dict() | {
@@ -212,7 +214,7 @@ def command(stage: Path, output: str, **options: Any) -> None:
         "skipped": skipped,
         "seconds": round(time.perf_counter() - started, 3),
     }
-    document |= flicker_of(job.log)
+    document |= flicker_of(job.log if in_time else None)
     if options["report_file"] is not None:
         write_report(options["report_file"], document)
     tell(report, options["quiet"])

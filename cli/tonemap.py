@@ -71,6 +71,8 @@ from .options import (
 @report_options
 def command(source: str, output: str, **options: Any) -> None:
     """Tone map SOURCE (.exr, 1.0 = 1 cd/m2) into OUTPUT (.png); both may hold ####."""
+    if options["fps"] is not None and not math.isfinite(options["fps"]):
+        raise click.UsageError(f"--fps {options['fps']}: want a number")
     if Path(output).suffix.lower() != ".png":
         raise click.UsageError(f"{output}: want a name that ends in .png")
     if options["frames"] is not None:
@@ -105,7 +107,8 @@ def command(source: str, output: str, **options: Any) -> None:
         "frames": len(jobs),
         "skipped": len(jobs) - len(written),
     }
-    document |= flicker_of(showing.log)
+    in_time = showing.viewing.operator.advance is not None and not showing.stills
+    document |= flicker_of(showing.log if in_time else None)
     if options["report_file"] is not None:
         write_report(options["report_file"], document)
     tell(report, options["quiet"])

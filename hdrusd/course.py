@@ -170,9 +170,12 @@ class Checkpoints:
                 return
             self.setup = setup
         elif setup != own:
+            given = setup if isinstance(setup, dict) else {}
+            other = ", ".join(key for key in own if given.get(key) != own[key])
             raise InputError(
                 self.file,
-                "states of a sequence with other settings; want the same, or another output",
+                f"states of a sequence with other settings ({other}); want the same, or another "
+                "output",
             )
         self.states = _states(self.file, document)
 
@@ -206,7 +209,7 @@ class Checkpoints:
 
 
 def read_state(path: Path, operator: Operator, before: float = math.inf) -> Known:
-    """What is known after the latest frame before ``before``.
+    """What is known after the latest frame before ``before``, or else after the latest of all.
 
     From a file of Checkpoints, or from the header of an EXR frame. Raises InputError, also for
     the state of another operator.
@@ -221,9 +224,10 @@ def read_state(path: Path, operator: Operator, before: float = math.inf) -> Know
     if document.get("operator") != operator.name:
         raise InputError(path, f"state of {document.get('operator')}; want one of {operator.name}")
     states = _states(path, document)
-    numbers = [number for number in states if number < before]
-    if not numbers:
-        raise InputError(path, f"no state of a frame before {before:g}")
+    if not states:
+        raise InputError(path, "no state; want that of a frame")
+    # Another shot may begin at a lower number: then it is the last one's eye that looks on.
+    numbers = [number for number in states if number < before] or list(states)
     return states[max(numbers)]
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from hdrusd.by_products import ByProducts, playback_rate
 from hdrusd.course import Checkpoints, Course, Cut, Known, Start
+from hdrusd.errors import InputError
 from hdrusd.frame_header import (
     DEFAULT_FPS,
     Clock,
@@ -19,6 +20,7 @@ from hdrusd.frame_header import (
     exposure_of,
     field_of,
     lamps_of,
+    note_broken,
     note_units,
     number_of,
     rate_of,
@@ -94,6 +96,9 @@ def tonemap_sequence(
     without a break. A file that does not say what its numbers are is taken as Rec. 709 in
     cd/m2, a finding. Raises InputError, ContextError.
     """
+    missing = next((source for _, source, _ in jobs if not source.is_file()), None)
+    if missing is not None:  # before anything of an earlier run is written anew
+        raise InputError(missing, "no such file")
     operator = showing.viewing.operator
     in_time = operator.advance is not None and not showing.stills
     states = None
@@ -119,6 +124,7 @@ def tonemap_sequence(
                 eye = eye or _Eye(showing, course)
                 rgb, header, layers = reader.read(source, _next_source(jobs, index, showing))
                 note_units(source, header, report)
+                note_broken(source, rgb, report)
                 # A name's number is the sequence's; a single picture has only its own.
                 number = frame if len(jobs) > 1 else number_of(header) or frame
                 rods = layers.get("scotopic.Y") if showing.viewing.night_colour else None

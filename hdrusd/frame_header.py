@@ -151,3 +151,11 @@ def note_units(source: Path, header: Mapping[str, Any], report: Report) -> None:
     if primaries is not None and not np.allclose(np.ravel(primaries), REC709, rtol=0, atol=1e-3):
         text = f"chromaticities {np.ravel(primaries).round(4).tolist()} are read as Rec. 709"
         report.add(Kind.REPLACED, "exr-primaries", place, "", text)
+
+
+def note_broken(source: Path, rgb: npt.NDArray[np.float32], report: Report) -> None:
+    """A finding for pixels of a frame that are no light: not a number, infinite or below 0."""
+    broken = int(np.count_nonzero(~((rgb >= 0.0) & (rgb < np.inf)).all(axis=-1)))
+    if broken:
+        text = f"{broken} pixels are no numbers, infinite or negative; shown black or as 1e12 cd/m2"
+        report.add(Kind.CLAMPED, "exr-pixels", SourceRef(source), "", text)

@@ -108,8 +108,9 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
 
     The temporary name keeps the suffix, by which libraries choose the format. On
     any failure it is removed and ``path`` stays as it was. Raises OSError, and
-    HdrusdError for what an image library says.
+    HdrusdError for what an image library says, and for a path that is no place for a file.
     """
+    path = place_for(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
     try:
@@ -121,6 +122,19 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
         if isinstance(problem, RuntimeError):
             raise HdrusdError(f"{path}: cannot be written ({_first_line(str(problem))})") from None
         raise
+
+
+def place_for(path: Path) -> Path:
+    """Where a file of that name is to be written: where a link leads, and else ``path``.
+
+    Raises HdrusdError for what is there and no file: a rename would put one in the place of a
+    device or a pipe.
+    """
+    if path.is_symlink():
+        path = Path(os.path.realpath(path))
+    if path.exists() and not path.is_file():
+        raise HdrusdError(f"{path}: not a regular file; want a name to write to")
+    return path
 
 
 def write_exr(

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.errors import HdrusdError, ParameterError
+from hdrusd.images import place_for
 
 #: H.264 comes first; what is in the wheels of PyAV depends on the platform.
 _CODECS = ("libx264", "libopenh264", "mpeg4")
@@ -65,7 +66,7 @@ class VideoWriter:
         check_video()
         if path.suffix.lower() != ".mp4":
             raise ParameterError(f"video: {path.name}: want a name that ends in .mp4")
-        self.path = path
+        self.path = path = place_for(path)
         self.rate = frame_rate(fps)
         self.frames = 0
         self._size: tuple[int, int] | None = None

@@ -83,6 +83,8 @@ class Viewing:
             "observer": asdict(self.observer),
             "screen": asdict(self.screen),
             "glare": self.glare.name if self.glare is not None else None,
+            "acuity": self.acuity,
+            "night_colour": self.night_colour,
         }
 
     def field(self, sight: Sight, size: tuple[int, int]) -> tuple[float, float]:

@@ -51,13 +51,18 @@ def acuity_levels(foveal: Foveal, size: tuple[int, int]) -> Array | None:
     ``foveal``: of the frame as the eye has it, with its veil; ``size``: width and height of
     the frame, pixels. None where a whole frame is left sharp: where the luminance that 5 %
     of the samples do not exceed resolves all its pixels.
+
+    A sample is as sharp as the sharpest beside it: blurs reach half a degree, and what is dark
+    and lies next to a lamp would gather the lamp's light in blots that the lamp has no part in.
     """
     y = foveal.luminance
     angles = pixel_angles(foveal, size)
     dark = np.percentile(y, DARK_SHARE)
     if 2.0 * angles.max() * resolvable(dark) >= 1.0:
         return None
-    return np.asarray(np.minimum(-np.log2(2.0 * angles * resolvable(y)), top_level(size)))
+    level = np.minimum(-np.log2(2.0 * angles * resolvable(y)), top_level(size))
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(level, 1, mode="edge"), (3, 3))
+    return np.asarray(around.min(axis=(2, 3)))
 
 
 def top_level(size: tuple[int, int]) -> int:
