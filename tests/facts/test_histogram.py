@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import time
 from pathlib import Path
 
 import numpy as np
@@ -269,14 +268,3 @@ def test_pcond_splits_the_lowest_bin() -> None:
     assert split.bmin == pytest.approx(plain.bmin - plain.width)
     np.testing.assert_allclose(split.counts[2:], plain.counts[1:])
     np.testing.assert_allclose(split.counts[:2], 0.5 * plain.counts[0])
-
-
-def test_fast_enough_for_every_frame() -> None:
-    # 100 bins with a threshold as in a video: about 1.2 ms, and 0.3 ms from the last frame's.
-    # Thirty times that, for machines that are busy.
-    bumps = np.exp(-0.5 * ((np.arange(100) - 50.0) / 15.0) ** 2)
-    h = Histogram(1000.0 * bumps, math.log(1e-3), math.log(1e5), 0.0)
-    began = time.process_time()
-    for _ in range(10):
-        filled(h)
-    assert (time.process_time() - began) / 10 < 0.04
