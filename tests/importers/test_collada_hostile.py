@@ -205,7 +205,7 @@ def test_entities_are_refused(tmp_path: Path, head: str, body: str) -> None:
     begin = time.monotonic()
     with pytest.raises(InputError, match=r"entit"):
         load(tmp_path, document(tool=body, head=head))
-    assert time.monotonic() - begin < 60.0
+    assert time.monotonic() - begin < 2.0
 
 
 @pytest.mark.parametrize(
@@ -358,7 +358,7 @@ def test_hostile_files_are_refused(testdata: Path, name: str) -> None:
     resolver = Resolver(testdata / "data" / name, Report())
     with pytest.raises(InputError, match=REFUSED[name]):
         read(resolver, Report())
-    assert time.monotonic() - begin < 60.0
+    assert time.monotonic() - begin < 10.0
 
 
 def test_no_file_of_the_data_is_forgotten(testdata: Path) -> None:

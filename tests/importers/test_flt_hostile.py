@@ -184,7 +184,7 @@ def test_the_walk_is_never_slow(tmp_path: Path, body: bytes) -> None:
     data = header() + body * (2_000_000 // len(body))
     start = time.perf_counter()
     places = walk(data, tmp_path)
-    assert time.perf_counter() - start < 60.0
+    assert time.perf_counter() - start < 5.0
     assert places.tolist() == walked(data)
 
 
