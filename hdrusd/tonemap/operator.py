@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from hdrusd.colour import clean, luminance
 from hdrusd.errors import HdrusdError, ParameterError, UnknownNameError
-from hdrusd.eye.foveal import Foveal, default_field, foveal
+from hdrusd.eye.foveal import VOID, Foveal, default_field, foveal
 from hdrusd.eye.observer import Observer
 from hdrusd.eye.screen import Screen
 from hdrusd.registry import Registry
@@ -33,7 +33,7 @@ State = Mapping[str, Any]
 
 #: cd/m2 that a pixel must exceed to be counted: the logarithm of a
 #: black pixel would decide the average of the whole frame.
-FLOOR = 1e-5
+FLOOR = VOID
 
 
 @dataclass(frozen=True, slots=True)
