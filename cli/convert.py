@@ -84,7 +84,8 @@ def command(
 
     Beside OUTPUT stand its layers (geometry, look, photometry) and textures.
     """
-    from hdrusd.convert import OUTPUT_SUFFIXES, Options, convert
+    from hdrusd.conversion import Options
+    from hdrusd.convert import OUTPUT_SUFFIXES, convert
     from hdrusd.report import Report
 
     if output.suffix.lower() not in OUTPUT_SUFFIXES:

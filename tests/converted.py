@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from pxr import Usd, UsdShade
 
-from hdrusd.convert import Options, Result, convert
+from hdrusd.conversion import Options, Result
+from hdrusd.convert import convert
 from hdrusd.units import LUMINANCE_WEIGHTS
 from hdrusd.usd.lux import is_light
 

@@ -24,7 +24,7 @@ from converted import (
 from pxr import Gf, Usd, UsdGeom, UsdShade
 
 from hdrusd import convert as convert_module
-from hdrusd.convert import Result
+from hdrusd.conversion import Result
 from hdrusd.errors import InputError, UnknownNameError, ValidationError
 from hdrusd.validation import validate
 

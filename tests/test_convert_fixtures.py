@@ -14,7 +14,7 @@ from builders import gltf_lights
 from converted import lights, opened, run, sidecar
 from pxr import Sdf, Usd, UsdGeom, UsdLux
 
-from hdrusd.convert import Result
+from hdrusd.conversion import Result
 from hdrusd.job import Job
 from hdrusd.render import render_sequence
 from hdrusd.report import Report

@@ -13,7 +13,7 @@ from converted import MOON, POINT, SPOT, lights, material, opened, run, sidecar,
 from photometric_files import ies_text, ldt_text
 from pxr import Usd, UsdGeom, UsdLux
 
-from hdrusd.convert import Result
+from hdrusd.conversion import Result
 from hdrusd.photometry.profile import pack_profiles, profile_candela
 from hdrusd.report import Kind, Report
 from hdrusd.scene import Camera, RenderScene

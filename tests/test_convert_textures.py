@@ -19,7 +19,7 @@ from converted import (
 )
 from pxr import Gf, Usd, UsdLux
 
-from hdrusd.convert import Result
+from hdrusd.conversion import Result
 from hdrusd.images import read_exr, read_image
 from hdrusd.units import LUMINANCE_WEIGHTS
 

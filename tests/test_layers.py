@@ -27,8 +27,9 @@ LAYERS = (
     {"importers", "images"},
     {"usd", "gpu", "adaptation_log", "bracket", "contact_sheet", "course", "video"}
     | {"frame_header", "frame_io"},
-    {"candela_plot", "job", "luminaires", "maps", "validation", "viewing"},
-    {"by_products", "surfaces"},
+    {"candela_plot", "conversion", "delivery", "job", "luminaires", "maps", "validation"}
+    | {"viewing"},
+    {"by_products", "lamps", "surfaces"},
     {"display"},
     {"convert", "render"},
     {"testing"},
@@ -37,7 +38,7 @@ LAYERS = (
 
 #: Who may import what does not come with Python; NumPy is everybody's.
 THIRD_PARTY = {
-    "pxr": {"schemas", "usd", "validation", "convert", "render"},
+    "pxr": {"schemas", "usd", "validation", "convert", "lamps", "render"},
     "moderngl": {"gpu", "render", "viewing"},
     "OpenEXR": {"images"},
     "OpenImageIO": {"bracket", "contact_sheet", "images"},

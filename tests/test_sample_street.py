@@ -19,7 +19,8 @@ import OpenImageIO
 import pytest
 from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade
 
-from hdrusd.convert import Options, convert
+from hdrusd.conversion import Options
+from hdrusd.convert import convert
 from hdrusd.errors import SourceRef
 from hdrusd.photometry.ies import read_ies
 from hdrusd.photometry.luminaire import Luminaire

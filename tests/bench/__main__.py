@@ -21,7 +21,8 @@ import click
 import moderngl
 import numpy as np
 
-from hdrusd.convert import Options, convert
+from hdrusd.conversion import Options
+from hdrusd.convert import convert
 from hdrusd.errors import SourceRef
 from hdrusd.gpu.context import create_context, describe
 from hdrusd.images import write_exr, write_png

@@ -15,7 +15,8 @@ from pathlib import Path
 
 import click
 
-from hdrusd.convert import Options, convert
+from hdrusd.conversion import Options
+from hdrusd.convert import convert
 
 HERE = Path(__file__).parent
 

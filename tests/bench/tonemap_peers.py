@@ -35,7 +35,8 @@ import moderngl
 import numpy as np
 import OpenImageIO as oiio
 
-from hdrusd.convert import Options, convert
+from hdrusd.conversion import Options
+from hdrusd.convert import convert
 from hdrusd.course import Course
 from hdrusd.glare.model import MODELS
 from hdrusd.gpu.context import create_context

@@ -24,7 +24,8 @@ from flt_builder import (
     vertex,
 )
 
-from hdrusd.convert import Options, convert
+from hdrusd.conversion import Options
+from hdrusd.convert import convert
 from hdrusd.importers.flt_lights import direction
 from hdrusd.report import Kind
 

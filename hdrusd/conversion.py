@@ -1,0 +1,49 @@
+"""What a conversion is asked, and what it answers: ``Options`` and ``Result``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from hdrusd.importers.importer import Limits
+from hdrusd.photometry.estimate import DEFAULT_RULE
+from hdrusd.report import Report
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """How to convert. ``gamma`` None: the photometry file's, else 2.2."""
+
+    photometry: Path | None = None
+    estimate: str = DEFAULT_RULE
+    gamma: float | None = None
+    meters_per_unit: float = 1.0
+    source_unit: float | None = None  # metres a source unit; None: what the format says
+    up: str | None = None  # "Y" or "Z"; None: what the format says
+    roots: Sequence[Path] = ()
+    search: Sequence[Path] = ()
+    limits: Limits = field(default_factory=Limits)
+
+
+@dataclass(slots=True)
+class Result:
+    """What was written, and the account of it."""
+
+    output: Path
+    report: Report
+    counts: dict[str, int]
+    lights: list[dict[str, Any]] = field(default_factory=list)
+    materials: list[dict[str, Any]] = field(default_factory=list)
+    textures: dict[str, dict[str, object]] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON form: docs/findings.md."""
+        return self.report.as_dict() | {
+            "output": str(self.output),
+            "counts": self.counts,
+            "lights": self.lights,
+            "materials": self.materials,
+            "textures": self.textures,
+        }

@@ -1,0 +1,203 @@
+"""What legacy lights become: their photometry, their luminaires, their fixtures, the sky."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+from pxr import UsdLux
+
+from hdrusd.errors import SourceRef
+from hdrusd.legacy import scene as legacy
+from hdrusd.luminaires import LuminaireFiles
+from hdrusd.photometry.interpret import Interpreter, LuminaireFile, luminance, rule_color
+from hdrusd.photometry.light import PhotometricLight, chromaticity
+from hdrusd.photometry.sidecar import Rule, Sidecar
+from hdrusd.report import Kind, Report
+from hdrusd.usd.fixtures import Lamp
+from hdrusd.usd.transform import across
+from hdrusd.usd.writer import Place, StageWriter
+
+
+@dataclass(frozen=True, slots=True)
+class _Lamp:
+    """A light of the source, ready to be written."""
+
+    place: Place
+    source: legacy.Light
+    light: PhotometricLight
+    right: legacy.Vec3 | None = None  # where C = 0 of its photometric file points
+    flux: float | None = None  # lm of its photometric file
+    shaded: bool = False  # by its own fixture too
+
+    def row(self, path: str) -> dict[str, Any]:
+        """The account of it for the report."""
+        row = _light_row(self.source.name, path, self.light, self.source)
+        row["place"] = str(self.place.node.source)
+        return row if self.flux is None else row | {"unit": "times the file", "flux_lm": self.flux}
+
+
+class LampMaker:
+    """Writes the lights of one scene; ``rows`` is the account of them for the report."""
+
+    def __init__(
+        self,
+        scene: legacy.LegacyScene,
+        sidecar: Sidecar,
+        interpreter: Interpreter,
+        luminaires: LuminaireFiles,
+        writer: StageWriter,
+        report: Report,
+    ) -> None:
+        self.scene = scene
+        self.sidecar = sidecar
+        self.interpreter = interpreter
+        self.luminaires = luminaires
+        self.writer = writer
+        self.report = report
+        self.rows: list[dict[str, Any]] = []
+        self.fixed: list[tuple[_Lamp, Lamp]] = []
+
+    def write(self) -> None:
+        """Every light of the scene, at its places, and the sky."""
+        ambients: list[PhotometricLight] = []
+        lamps: list[_Lamp] = []
+        for place in self.writer.places:
+            for index in place.node.lights:
+                light = self.scene.lights[index]
+                rule = self.sidecar.match("light", light.name, place.node.name)
+                if light.kind == "ambient" and self.sidecar.ambient is not None:
+                    text = f"{self.sidecar.ambient.place} says the sky; not added to it"
+                    self.report.add(
+                        Kind.REPLACED, "ambient-replaced", light.source, light.name, text
+                    )
+                    continue
+                file = self._luminaire(light, rule)
+                meaning = self.interpreter.light(light, rule, file)
+                if meaning is not None and meaning.kind == "ambient":
+                    ambients.append(meaning)
+                elif meaning is not None:
+                    shaded = rule is not None and bool(rule.values.get("fixture_shadow"))
+                    lamp = _Lamp(place, light, meaning, shaded=shaded)
+                    if rule is not None and file is not None:
+                        lamp = self._aimed(lamp, rule, file)
+                    lamps.append(lamp)
+        for lamp in lamps:
+            prim = self.writer.write_light(lamp.place, lamp.source, lamp.light, lamp.right)
+            self.rows.append(lamp.row(str(prim.GetPath())))
+            if lamp.light.kind in ("point", "spot") and not lamp.shaded:
+                self.fixed.append((lamp, Lamp(prim, lamp.light)))
+        ambient = self._ambient(ambients)
+        if ambient is not None:
+            path = self.writer.write_ambient(ambient).GetPath()
+            self.rows.append(_light_row("Sky", str(path), ambient, None))
+
+    def _luminaire(self, light: legacy.Light, rule: Rule | None) -> LuminaireFile | None:
+        """The photometric file that a rule gives to a light with a place."""
+        if rule is None or "ies" not in rule.values or light.kind not in ("point", "spot"):
+            return None
+        return self.luminaires.use(str(rule.values["ies"]), rule.place)
+
+    def _aimed(self, lamp: _Lamp, rule: Rule, file: LuminaireFile) -> _Lamp:
+        """The lamp with its luminaire's axis and C = 0 where the rule has them."""
+
+        def note(kind: Kind, text: str) -> None:
+            self.report.add(kind, "profile-aim", rule.place, lamp.source.name, text)
+
+        axis, right = rule.three("axis"), rule.three("c0")
+        if axis is None and lamp.source.kind == "point":
+            note(Kind.ASSUMED, "gamma = 0 points along the light's -Z; axis says otherwise")
+        source = replace(lamp.source, direction=axis or lamp.source.direction)
+        if right is None and not file.symmetric:
+            note(Kind.ASSUMED, "C = 0 points as the shortest turn leaves +X; c0 says otherwise")
+        elif right is not None and across(right, source.direction) is None:
+            note(Kind.INVALID, "c0 lies along the axis; not used")
+        flux = lamp.light.intensity * file.luminaire.flux()
+        return replace(lamp, source=source, right=right, flux=flux)
+
+    def _ambient(self, from_lights: list[PhotometricLight]) -> PhotometricLight | None:
+        """The photometry file's sky, else the sum of what the source calls ambient."""
+        rule = self.sidecar.ambient
+        if rule is not None:
+            return PhotometricLight(
+                "ambient",
+                rule.number("illuminance") or 0.0,
+                rule_color(rule, temperature_rgb) or (1.0, 1.0, 1.0),
+                provenance=rule.provenance,
+                rule=str(rule.place),
+                source=rule.source,
+            )
+        if self.scene.ambient is not None and luminance(self.scene.ambient) > 0.0:
+            estimate = self.interpreter.estimate
+            color, strength = chromaticity(estimate.lux(self.scene.ambient))
+            self.report.add(
+                Kind.GUESSED,
+                "ambient-estimate",
+                SourceRef(self.scene.source),
+                "light model",
+                f"{strength:.4g} lx of sky by rule {estimate.name}; the source has no unit",
+            )
+            from_lights = [
+                *from_lights,
+                PhotometricLight("ambient", strength, color, rule=estimate.name),
+            ]
+        if not from_lights:
+            return None
+        r, g, b = (
+            sum(light.intensity * light.chromaticity[i] for light in from_lights) for i in range(3)
+        )
+        color, strength = chromaticity((r, g, b))
+        return replace(from_lights[0], intensity=strength, chromaticity=color)
+
+    def free(self) -> None:
+        """Lamps inside their own fixtures shine out of them."""
+        self.writer.free_lamps([it for _, it in self.fixed])
+        for lamp, it in self.fixed:
+
+            def note(code: str, text: str, source: legacy.Light = lamp.source) -> None:
+                self.report.add(Kind.ASSUMED, code, source.source, source.name, text)
+
+            for mesh in it.fixtures:
+                note("fixture-shadow", f"stands inside {mesh.path}, its fixture: no shadow of it")
+            if it.too_large is not None:
+                note(
+                    "fixture-large",
+                    f"held by {it.too_large.path}, which is too large to be its fixture and "
+                    "shades it; want a mesh of the fixture alone",
+                )
+            if not it.looked_at:
+                note("fixture-search", "too much about it to look for its fixture")
+
+
+def temperature_rgb(kelvin: float) -> legacy.RGB:
+    """USD's own blackbody colour, luminance 1; its range is 1000 to 10000 K."""
+    r, g, b = UsdLux.BlackbodyTemperatureAsRgb(min(max(kelvin, 1000.0), 10_000.0))
+    return chromaticity((r, g, b))[0]
+
+
+def _light_row(
+    name: str, path: str, light: PhotometricLight, source: legacy.Light | None
+) -> dict[str, Any]:
+    unit = "cd" if light.kind in ("point", "spot") else "lx"
+    legacy_value: dict[str, Any] | None = None
+    if source is not None:
+        legacy_value = {
+            "diffuse": list(source.diffuse),
+            "candela": source.candela,
+            "lux": source.lux,
+        }
+    return {
+        "name": name,
+        "path": path,
+        "place": "",
+        "kind": light.kind,
+        "value": light.intensity,
+        "unit": unit,
+        "chromaticity": list(light.chromaticity),
+        "provenance": light.provenance,
+        "rule": light.rule,
+        "source_value": legacy_value,
+        "file": light.profile or None,
+        "flux_lm": light.intensity * 4.0 * math.pi if light.kind == "point" else None,
+    }
