@@ -27,8 +27,8 @@ LAYERS = (
     {"importers", "images"},
     {"usd", "gpu", "adaptation_log", "bracket", "contact_sheet", "course", "video"}
     | {"frame_header", "frame_io"},
-    {"candela_plot", "conversion", "delivery", "job", "luminaires", "maps", "validation"}
-    | {"viewing"},
+    {"candela_plot", "conversion", "delivery", "inspection", "job", "luminaires", "maps"}
+    | {"validation", "viewing"},
     {"by_products", "lamps", "surfaces"},
     {"display"},
     {"convert", "render"},
