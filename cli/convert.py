@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import click
@@ -84,6 +85,7 @@ def command(
 
     Beside OUTPUT stand its layers (geometry, look, photometry) and textures.
     """
+    from hdrusd.account.text import summary
     from hdrusd.conversion import Options
     from hdrusd.convert import OUTPUT_SUFFIXES, convert
     from hdrusd.report import Report
@@ -112,12 +114,16 @@ def command(
     if report_file is not None:
         write_report(report_file, document)
     tell(report, quiet)
+    if not quiet:
+        for line in summary(document, shutil.get_terminal_size((100, 24)).columns):
+            click.echo(line, err=True)
     if as_json:
         click.echo(json.dumps(document))
     else:
         counts = result.counts
         click.echo(
             f"{output}: {counts['triangles']} triangles, {counts['materials']} materials, "
-            f"{len(result.textures)} textures, {len(result.lights)} lights"
+            f"{len(result.textures)} textures, "
+            f"{sum(row['lamps'] for row in result.lights)} lights"
         )
     finish(report, strict)

@@ -21,6 +21,7 @@ COMMANDS = {
     "tonemap": "Tone map frames in cd/m2.",
     "bracket": "Merge bracketed photographs into an HDR picture in cd/m2.",
     "check": "Run the photometric validators on a stage.",
+    "recipe": "Write a first photometry file, by what a database holds.",
     "inspect": "Print what a legacy database says, in its own numbers.",
     "info": "Say what a database, a stage or a frame holds.",
     "photometry": "Check, convert or draw a photometric file (IES LM-63, EULUMDAT).",

@@ -182,7 +182,11 @@ COMPLEXITIES |= {"1.0": 0, "1.1": 1, "1.2": 2, "1.3": 3}
     "--mesopic", is_flag=True, help="Write mesopic luminance (CIE 191) as the layer mesopic.Y."
 )
 @click.option("--half", is_flag=True, help="Half floats in the EXR; above 65504 they clip.")
-@click.option("--resume", is_flag=True, help="Skip frames whose files are there.")
+@click.option(
+    "--resume",
+    is_flag=True,
+    help="Skip frames whose files are there; those of other settings are refused.",
+)
 @eye_options
 @operator_options
 @report_options

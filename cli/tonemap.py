@@ -65,7 +65,11 @@ from .options import (
     "else 40 for the larger side]",
 )
 @click.option("--reference", is_flag=True, help="On the CPU, by the NumPy definition.")
-@click.option("--resume", is_flag=True, help="Skip pictures that are there.")
+@click.option(
+    "--resume",
+    is_flag=True,
+    help="Skip pictures that are there; those of other settings are refused.",
+)
 @eye_options
 @operator_options
 @report_options

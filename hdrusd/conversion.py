@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from hdrusd.account.fix_first import Scene, fix_first
+from hdrusd.account.totals import totals
 from hdrusd.importers.importer import Limits
 from hdrusd.photometry.estimate import DEFAULT_RULE
 from hdrusd.report import Report
@@ -37,13 +39,32 @@ class Result:
     lights: list[dict[str, Any]] = field(default_factory=list)
     materials: list[dict[str, Any]] = field(default_factory=list)
     textures: dict[str, dict[str, object]] = field(default_factory=dict)
+    images: list[dict[str, Any]] = field(default_factory=list)
+    diagonal: float = 0.0  # m, of the whole scene
+    ground: float = 0.0  # m2 below its bounding box
+    unit_stated: bool = False  # by whoever asked for the conversion
+    source: Path | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON form: docs/findings.md."""
-        return self.report.as_dict() | {
+        """JSON form: docs/report.md."""
+        document = self.report.as_dict()
+        scene = Scene(
+            self.lights,
+            self.materials,
+            self.images,
+            document["findings"],
+            self.ground,
+            self.diagonal,
+            self.unit_stated,
+            self.source.stem if self.source else "",
+        )
+        return document | {
             "output": str(self.output),
             "counts": self.counts,
+            "totals": totals(self.lights, self.materials, self.images, self.report.kinds()),
+            "fix_first": fix_first(scene),
             "lights": self.lights,
             "materials": self.materials,
+            "images": self.images,
             "textures": self.textures,
         }

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any, cast
 
+import numpy.typing as npt
 from pxr import Sdf, Usd
 
+from hdrusd.account.images import image_rows
+from hdrusd.account.reflectances import Reflectances
+from hdrusd.account.wear import worn
+from hdrusd.added_lamps import add_lamps
 from hdrusd.conversion import Options, Result
 from hdrusd.delivery import check_output, move_into_place, work_folder
 from hdrusd.errors import InputError, SourceRef, ValidationError
@@ -15,15 +23,22 @@ from hdrusd.lamps import LampMaker, temperature_rgb
 from hdrusd.legacy import scene as legacy
 from hdrusd.luminaires import LuminaireFiles
 from hdrusd.maps import MapWriter
+from hdrusd.overlay.stage import SUFFIXES, Overlay
 from hdrusd.photometry.estimate import RULES
 from hdrusd.photometry.interpret import Interpreter
+from hdrusd.photometry.lamp_area import LampArea
 from hdrusd.photometry.sidecar import FILE_NAME, Rule, Sidecar, read_sidecar
 from hdrusd.report import Kind, Report
+from hdrusd.skies import SkyFiles
 from hdrusd.surfaces import SurfaceMaker, colored_materials, material_rows
-from hdrusd.usd.material import write_look, write_photometric
+from hdrusd.usd.authorship import authorship_inputs, write_authorship
+from hdrusd.usd.material import Surface, write_look, write_photometric
 from hdrusd.usd.mesh import COLOR_PRIMVAR
+from hdrusd.usd.placed import area_scales, footprint
 from hdrusd.usd.settings import Settings
-from hdrusd.usd.writer import Place, StageWriter
+from hdrusd.usd.tree import Place
+from hdrusd.usd.worn_area import lamp_area
+from hdrusd.usd.writer import StageWriter
 from hdrusd.validation import validate
 
 #: Suffixes of a stage that convert writes: text at the top, so that a person can read it.
@@ -40,7 +55,11 @@ def convert(source: Path, output: Path, options: Options, report: Report | None 
     if not source.is_file():
         raise InputError(source, "no such file")
     with work_folder(output) as folder:
-        result = _Conversion(source, output, folder, options, report).run()
+        if source.suffix.lower() in SUFFIXES:
+            sidecar = _find_sidecar(source, options, report)
+            result = Overlay(source, output, folder, options, sidecar, report).run()
+        else:
+            result = _Conversion(source, output, folder, options, report).run()
         move_into_place(folder, output)
     return result
 
@@ -58,6 +77,8 @@ class _Conversion:
         self.sidecar = _find_sidecar(source, options, report)
         resolver = Resolver(source, report, options.roots, options.search, options.limits)
         self.scene = read_legacy(resolver, report)
+        self.result = Result(output, report, self.scene.counts(), source=source)
+        self.added = add_lamps(self.scene, self.sidecar)
         stem = output.stem
         files = folder / f"{stem}.textures", f"./{stem}.textures"
         self.maps = MapWriter(*files, report)
@@ -65,6 +86,7 @@ class _Conversion:
             self.sidecar.path or source, report, options.roots, options.search, options.limits
         )
         self.luminaires = LuminaireFiles(*files, named, report)
+        self.skies = SkyFiles(*files, report)
         self.writer = StageWriter(
             folder,
             stem,
@@ -74,7 +96,7 @@ class _Conversion:
             source_unit=options.source_unit or self.scene.unit_m,
             up=options.up or self.scene.up,
         )
-        self.result = Result(output, report, self.scene.counts())
+        self.surfaces: list[Surface] = []
 
     def run(self) -> Result:
         """The steps, in order."""
@@ -88,9 +110,18 @@ class _Conversion:
             temperature_rgb,
             self.report,
         )
-        self._write_materials(interpreter)
+        pictures = (m.diffuse_map.image for m in self.scene.materials if m.diffuse_map)
+        with self.maps.threaded(pictures):
+            self._write_materials(interpreter)
         lamps = LampMaker(
-            self.scene, self.sidecar, interpreter, self.luminaires, self.writer, self.report
+            self.scene,
+            self.sidecar,
+            interpreter,
+            self.luminaires,
+            self.skies,
+            self.writer,
+            self.report,
+            self.added,
         )
         lamps.write()
         self.result.lights = lamps.rows
@@ -99,12 +130,14 @@ class _Conversion:
         camera = self._write_cameras()
         self._show_nodes()
         lamps.free()
+        self._account()
         self.writer.write_settings(
             Settings(camera=camera, resolution=_RESOLUTION, operator="reinhard02")
         )
         self.sidecar.note_unmatched(self.report)
+        inputs = authorship_inputs(self.scene.source, self.sidecar.path)
+        write_authorship(self.writer.layers["photometry"], self.writer.root, inputs)
         self.writer.save()
-        self.result.textures = self.maps.written | self.luminaires.written
         self._validate()
         return self.result
 
@@ -115,7 +148,16 @@ class _Conversion:
         colored = colored_materials(self.scene)
         maker = SurfaceMaker(self.maps, interpreter, self.sidecar, self.options.gamma, self.report)
         glossed = [maker.glossed(material) for material in materials]
-        surfaces = [maker.surface(m, colored=i in colored) for i, m in enumerate(glossed)]
+        surfaces = [
+            maker.surface(
+                m,
+                colored=i in colored,
+                area=partial(self._lamp_area, i),
+                places=partial(self._lamp_places, i),
+            )
+            for i, m in enumerate(glossed)
+        ]
+        self.surfaces = surfaces
 
         def look(stage: Usd.Stage, index: int, path: Sdf.Path) -> None:
             maps = maker.look(materials[index])
@@ -129,6 +171,17 @@ class _Conversion:
         self.writer.edit_materials("look", look)
         self.writer.edit_materials("photometry", photometric)
         self.result.materials = material_rows(materials, self.writer.materials, surfaces)
+
+    def _lamp_area(self, material: int) -> LampArea | None:
+        writer = self.writer
+        return lamp_area(writer.stage, self.scene, writer.meshes, writer.tree.copies, material)
+
+    def _lamp_places(self, material: int, texture: legacy.Texture) -> npt.NDArray[Any] | None:
+        materials = list(self.scene.materials)
+        materials[material] = replace(materials[material], diffuse_map=texture)
+        writer = self.writer
+        scales = area_scales(writer.stage, writer.meshes, writer.tree.copies)
+        return worn(replace(self.scene, materials=materials), scales, material).uv
 
     # -- cameras, nodes, checks ------------------------------------------------------------
 
@@ -148,6 +201,22 @@ class _Conversion:
             rule = self.sidecar.match("node", place.node.name)
             if rule is not None and "visible" in rule.values:
                 self.writer.set_visible(place, visible=rule.values["visible"])
+
+    def _account(self) -> None:
+        """What a person needs to judge the result: areas, reflectances, textures by class."""
+        result, stage = self.result, self.writer.stage
+        result.textures = self.maps.written | self.luminaires.written | self.skies.written
+        result.diagonal, result.ground = self.writer.diagonal(), footprint(stage)
+        result.unit_stated = self.options.source_unit is not None
+        scales = area_scales(stage, self.writer.meshes, self.writer.tree.copies)
+        judge = Reflectances(self.maps.overview, self.report)
+        pairs = zip(self.scene.materials, self.surfaces, result.materials, strict=True)
+        for index, (material, surface, row) in enumerate(pairs):
+            file = surface.diffuse_map.file.rpartition("/")[2] if surface.diffuse_map else ""
+            factor = cast("list[float] | None", self.maps.written.get(file, {}).get("diffuse"))
+            row |= judge.row(material, surface, worn(self.scene, scales, index), factor)
+        areas = [row["area_m2"] for row in result.materials]
+        result.images = image_rows(self.scene.materials, self.surfaces, areas, result.textures)
 
     def _validate(self) -> None:
         stage = Usd.Stage.Open(str(self.folder / self.output.name))

@@ -16,8 +16,9 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from hdrusd.errors import InputError, ParameterError
+from hdrusd.errors import InputError, ParameterError, SourceRef
 from hdrusd.images import read_exr_header, write_atomically
+from hdrusd.report import Kind, Report
 from hdrusd.tonemap.operator import Moment, Operator, State, statistics
 
 #: What becomes of the eye at a cut: it stays as it was, or knows the new view already.
@@ -138,6 +139,17 @@ class Course:
         need = self.operator.needs(moment.parameters)
         frame = np.full((2, 2, 3), luminance)
         return replace(moment, statistics=statistics(frame, need, angles))
+
+
+def note_cuts(
+    cuts: Collection[float], frames: Collection[float], place: SourceRef, report: Report
+) -> None:
+    """A finding for cuts at frames that are not seen: misspelt, or another part's."""
+    unseen = sorted(set(cuts) - set(frames))
+    if unseen:
+        some = ", ".join(f"{number:g}" for number in unseen[:8]) + ", ..." * (len(unseen) > 8)
+        text = f"--cuts {some}: not frames of this sequence; nothing is cut there"
+        report.add(Kind.MISSING, "cuts", place, "", text)
 
 
 @dataclass(slots=True)

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from hdrusd.by_products import ByProducts, playback_rate
-from hdrusd.course import Checkpoints, Course, Cut, Known, Start
-from hdrusd.errors import InputError
+from hdrusd.course import Checkpoints, Course, Cut, Known, Start, note_cuts
+from hdrusd.errors import InputError, SourceRef
 from hdrusd.frame_header import (
     DEFAULT_FPS,
     Clock,
@@ -31,8 +31,18 @@ from hdrusd.gpu.ldr import deep
 from hdrusd.gpu.program import Programs
 from hdrusd.images import read_exr_header, write_png
 from hdrusd.report import Report
+from hdrusd.resuming import VIEWING, check_pictures, viewing_text
 from hdrusd.tonemap.operator import Moment
-from hdrusd.viewing import Eye, ReferenceEye, Shown, Sight, Viewing, with_exposure, with_rods
+from hdrusd.viewing import (
+    Eye,
+    ReferenceEye,
+    Shown,
+    Sight,
+    Viewing,
+    note_glare,
+    with_exposure,
+    with_rods,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +109,9 @@ def tonemap_sequence(
     missing = next((source for _, source, _ in jobs if not source.is_file()), None)
     if missing is not None:  # before anything of an earlier run is written anew
         raise InputError(missing, "no such file")
+    place = SourceRef(jobs[0][1])
+    note_glare(showing.viewing, place, report)
+    note_cuts(showing.cuts, [frame for frame, _, _ in jobs], place, report)
     operator = showing.viewing.operator
     in_time = operator.advance is not None and not showing.stills
     states = None
@@ -107,6 +120,11 @@ def tonemap_sequence(
         if showing.resume or showing.start.file is not None:
             states.load(showing.resume)
     course = showing.course()
+    setup = showing.viewing.setup()
+    texts = {VIEWING: viewing_text(setup)}
+    if showing.resume:
+        there_already = (target for _, _, target in jobs if target.is_file())
+        check_pictures(there_already, setup, report)
     begin = 0
     if in_time and showing.resume:
         done = [target.is_file() for _, _, target in jobs]
@@ -143,7 +161,8 @@ def tonemap_sequence(
                 if states is not None:
                     states.keep(frame, Known(sight.time, moment.state, sight.camera))
                 if shown is not None:
-                    writer.submit(write_png, target, shown.picture, pq=deep(shown.moment.screen))
+                    pq = deep(shown.moment.screen)
+                    writer.submit(write_png, target, shown.picture, pq=pq, texts=texts)
                 yield Seen(frame, target, sight.time, moment, shown)
         finally:
             if states is not None:

@@ -1,4 +1,4 @@
-"""What the header of an EXR frame says for an eye: rate, field of view, camera, lamps beside it.
+"""What the header of an EXR frame says for an eye: rate, field of view, camera, lamps.
 
 Headers come from anywhere: what makes no sense is as if it were not there.
 """
@@ -17,12 +17,10 @@ import numpy.typing as npt
 from hdrusd.errors import SourceRef
 from hdrusd.images import REC709
 from hdrusd.report import Kind, Report
+from hdrusd.scene import Camera
 
 #: Frames a second where neither the user nor the file says (UsdStage's default).
 DEFAULT_FPS = 24.0
-
-#: Lamps beside the frame that a header names at most, the most dazzling first.
-MOST_LAMPS = 128
 
 #: Text of lamps that is read at most.
 _LONGEST = 1 << 16
@@ -93,6 +91,15 @@ def field_of(
     )
 
 
+def field_of_view(camera: Camera) -> tuple[float, float] | None:
+    """Width and height of a camera's picture in degrees; None for an orthographic one."""
+    if camera.orthographic:
+        return None
+    left, right, bottom, top = camera.window
+    across = math.degrees(2.0 * math.atan((right - left) / 2.0))
+    return across, math.degrees(2.0 * math.atan((top - bottom) / 2.0))
+
+
 def camera_of(header: Mapping[str, Any]) -> str | None:
     """The name of the camera."""
     camera = header.get("hdrusd:camera")
@@ -107,25 +114,13 @@ def exposure_of(header: Mapping[str, Any]) -> float | None:
     return None
 
 
-def most_dazzling(lamps: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Of lamps (n, 6) beside the frame (glare/veil.py) what a header holds, in float32.
-
-    The MOST_LAMPS with the most lux by the square of their angle from the line of sight.
-    """
-    rows = np.asarray(lamps, np.float32).astype(np.float64).reshape(-1, 6)
-    angle = np.arccos(np.clip(-rows[:, 2], -1.0, 1.0))
-    weight = rows[:, 3:].max(axis=1, initial=0.0) / np.maximum(angle, 0.01) ** 2
-    kept = np.argsort(-weight, kind="stable")[:MOST_LAMPS]
-    return np.asarray(rows[np.sort(kept)])
-
-
 def lamps_text(lamps: npt.NDArray[np.float64]) -> str:
-    """``most_dazzling`` lamps as ``hdrusd:lamps`` says them; nine digits keep a float32."""
+    """Rows of glare/dazzling.py as ``hdrusd:lamps`` says them; nine digits keep a float32."""
     return json.dumps([[float(f"{value:.9g}") for value in row] for row in lamps])
 
 
 def lamps_of(header: Mapping[str, Any]) -> npt.NDArray[np.float64] | None:
-    """The lamps beside the frame; None where it states none."""
+    """Rows of lamps and of pixels that show them (glare/veil.py); None where it states none."""
     text = header.get("hdrusd:lamps")
     if not isinstance(text, str) or len(text) > _LONGEST:
         return None
@@ -137,7 +132,8 @@ def lamps_of(header: Mapping[str, Any]) -> npt.NDArray[np.float64] | None:
     sound = (
         np.isfinite(rows).all(axis=1) & (np.abs(length - 1.0) < 1e-3) & (rows >= -1.0).all(axis=1)
     )
-    return np.asarray(rows[sound & (rows[:, 3:] >= 0.0).all(axis=1)])
+    lamp, pixel = (rows[:, 3:] >= 0.0).all(axis=1), (rows[:, 3:] <= 0.0).all(axis=1)
+    return np.asarray(rows[sound & (lamp | pixel)])
 
 
 def note_units(source: Path, header: Mapping[str, Any], report: Report) -> None:

@@ -50,6 +50,9 @@ _COMPRESSIONS: dict[str, Any] = {
 #: Rec. 2020 primaries, PQ, no matrix, full range (ITU-T H.273).
 _PQ = (9, 16, 0, 1)
 
+#: What OpenImageIO calls pictures of six sides, which it lays out in one.
+_OTHER_LAYOUTS = ("CubeFace Environment", "CubeFace Shadow")
+
 #: The largest finite half float.
 HALF_MAX = 65504.0
 
@@ -61,6 +64,13 @@ def read_image(path: Path, data: bytes | None = None) -> ImageData:
     ``path`` then only names it. 16-bit integers come back as float32 in [0, 1].
     Colours are as the file has them, not multiplied by alpha. Raises InputError.
     """
+    found = read_small_image(path, data, MAX_PIXELS)
+    assert found is not None  # more pixels are refused
+    return found
+
+
+def read_small_image(path: Path, data: bytes | None, most: int) -> ImageData | None:
+    """As ``read_image``; None, with nothing decoded, for a picture of more than ``most`` pixels."""
     if data is None and not path.is_file():
         raise InputError(path, "no such image")
     with tempfile.TemporaryDirectory() as folder:
@@ -68,10 +78,10 @@ def read_image(path: Path, data: bytes | None = None) -> ImageData:
         if data is not None:  # OpenImageIO's memory reader knows few formats
             real = Path(folder) / Path(path.name.rstrip("]")).name
             real.write_bytes(data)
-        return _decode(real, path)
+        return _decode(real, path, most)
 
 
-def _decode(real: Path, named: Path) -> ImageData:
+def _decode(real: Path, named: Path, most: int) -> ImageData | None:
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)
     picture = oiio.ImageInput.open(str(real), config)
@@ -80,6 +90,10 @@ def _decode(real: Path, named: Path) -> ImageData:
     try:
         spec = picture.spec()
         check_size(named, spec.width, spec.height, real.stat().st_size)
+        if spec.depth > 1 or spec.getattribute("textureformat") in _OTHER_LAYOUTS:
+            raise InputError(named, "a cube or a volume of pictures; want one picture")
+        if spec.width * spec.height > most:
+            return None
         kind = {"uint8": oiio.UINT8, "half": oiio.HALF}.get(str(spec.format), oiio.FLOAT)
         channels = min(spec.nchannels, 4)
         pixels = picture.read_image(0, 0, 0, channels, kind)
@@ -152,11 +166,14 @@ def write_exr(
     ``luminance``: the values are cd/m2 and the header says so; False for
     reflectance maps. ``attributes``: further header entries (str, int, float,
     NumPy arrays of 9 or 16 floats). ``half``: half floats; what is beyond +-65504 is
-    written as that (``half_clipped`` counts it). ``compression`` loses nothing. ``layers``:
-    channels beside the colour, (h, w), by names as "scotopic.Y"; always as float32.
+    written as that (``half_clipped`` counts it), halves as they are. ``compression`` loses
+    nothing. ``layers``: channels beside the colour, (h, w), by names as "scotopic.Y"; always
+    as float32.
     """
     dtype = np.float16 if half else np.float32
-    pixels = np.ascontiguousarray(np.clip(rgb, -HALF_MAX, HALF_MAX) if half else rgb, dtype)
+    if half and rgb.dtype != np.float16:  # slow in halves, which come from tables
+        rgb = np.clip(rgb, -HALF_MAX, HALF_MAX)
+    pixels = np.ascontiguousarray(rgb, dtype)
     header: dict[str, Any] = {
         "compression": _COMPRESSIONS[compression],
         "type": OpenEXR.scanlineimage,
@@ -245,10 +262,29 @@ def read_exr_header(path: Path) -> dict[str, Any]:
         raise InputError(path, f"not a readable EXR ({_first_line(str(problem))})") from problem
 
 
-def write_png(path: Path, pixels: npt.NDArray[Any], comment: str = "", *, pq: bool = False) -> None:
+def read_png_text(path: Path, name: str) -> str | None:
+    """The text ``name`` of a PNG; None where it has none, and for what is no picture."""
+    source = oiio.ImageInput.open(str(path))
+    if source is None:
+        oiio.geterror()  # else it is the next one's
+        return None
+    said = source.spec().get_string_attribute(name)
+    source.close()
+    return str(said) or None
+
+
+def write_png(
+    path: Path,
+    pixels: npt.NDArray[Any],
+    comment: str = "",
+    *,
+    pq: bool = False,
+    texts: Mapping[str, str] | None = None,
+) -> None:
     """Write code values, (h, w, 1 to 4) uint8 or uint16, top row first, alpha apart.
 
-    sRGB, or with ``pq`` Rec. 2020 by SMPTE ST 2084, which the chunk cICP then says.
+    sRGB, or with ``pq`` Rec. 2020 by SMPTE ST 2084, which the chunk cICP then says. ``texts``
+    by name, as ``read_png_text`` finds them.
     """
     h, w, channels = pixels.shape
 
@@ -266,6 +302,8 @@ def write_png(path: Path, pixels: npt.NDArray[Any], comment: str = "", *, pq: bo
         spec.attribute("png:compressionLevel", 4)
         if comment:
             spec.attribute("ImageDescription", comment)
+        for name, text in (texts or {}).items():
+            spec.attribute(name, text)
         out = oiio.ImageOutput.create(str(temporary))
         if out is None or not out.open(str(temporary), spec):
             raise RuntimeError(out.geterror() if out else oiio.geterror())

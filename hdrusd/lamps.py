@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 from pxr import UsdLux
 
+from hdrusd.account.lights import light_row
 from hdrusd.errors import SourceRef
 from hdrusd.legacy import scene as legacy
 from hdrusd.luminaires import LuminaireFiles
 from hdrusd.photometry.interpret import Interpreter, LuminaireFile, luminance, rule_color
 from hdrusd.photometry.light import PhotometricLight, chromaticity
 from hdrusd.photometry.sidecar import Rule, Sidecar
+from hdrusd.photometry.spread import SHAPES
 from hdrusd.report import Kind, Report
+from hdrusd.skies import Sky, SkyFiles
 from hdrusd.usd.fixtures import Lamp
+from hdrusd.usd.preset_sky import write_sky_dome, write_sky_sun
 from hdrusd.usd.transform import across
-from hdrusd.usd.writer import Place, StageWriter
+from hdrusd.usd.tree import Place
+from hdrusd.usd.writer import StageWriter
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +36,17 @@ class _Lamp:
     flux: float | None = None  # lm of its photometric file
     shaded: bool = False  # by its own fixture too
 
-    def row(self, path: str) -> dict[str, Any]:
+    def row(self, path: str, places: int) -> dict[str, Any]:
         """The account of it for the report."""
-        row = _light_row(self.source.name, path, self.light, self.source)
-        row["place"] = str(self.place.node.source)
-        return row if self.flux is None else row | {"unit": "times the file", "flux_lm": self.flux}
+        return light_row(
+            self.source.name,
+            path,
+            self.light,
+            self.source,
+            place=str(self.place.node.source),
+            places=places,
+            file_flux=self.flux,
+        )
 
 
 class LampMaker:
@@ -47,13 +58,17 @@ class LampMaker:
         sidecar: Sidecar,
         interpreter: Interpreter,
         luminaires: LuminaireFiles,
+        skies: SkyFiles,
         writer: StageWriter,
         report: Report,
+        added: Mapping[int, Rule],
     ) -> None:
         self.scene = scene
         self.sidecar = sidecar
+        self.added = added  # the rules of lamps that the database lacked, by their lights
         self.interpreter = interpreter
         self.luminaires = luminaires
+        self.skies = skies
         self.writer = writer
         self.report = report
         self.rows: list[dict[str, Any]] = []
@@ -66,7 +81,9 @@ class LampMaker:
         for place in self.writer.places:
             for index in place.node.lights:
                 light = self.scene.lights[index]
-                rule = self.sidecar.match("light", light.name, place.node.name)
+                rule = self.added.get(index)
+                if rule is None:
+                    rule = self.sidecar.match("light", light.name, place.node.name)
                 if light.kind == "ambient" and self.sidecar.ambient is not None:
                     text = f"{self.sidecar.ambient.place} says the sky; not added to it"
                     self.report.add(
@@ -82,16 +99,19 @@ class LampMaker:
                     lamp = _Lamp(place, light, meaning, shaded=shaded)
                     if rule is not None and file is not None:
                         lamp = self._aimed(lamp, rule, file)
+                    elif rule is not None:
+                        lamp = self._shaped(lamp, rule)
                     lamps.append(lamp)
         for lamp in lamps:
             prim = self.writer.write_light(lamp.place, lamp.source, lamp.light, lamp.right)
-            self.rows.append(lamp.row(str(prim.GetPath())))
-            if lamp.light.kind in ("point", "spot") and not lamp.shaded:
+            places = len(self.writer.tree.copies.places(prim.GetPath()))
+            self.rows.append(lamp.row(str(prim.GetPath()), places))
+            one = lamp.source.positions is None
+            if lamp.light.kind in ("point", "spot") and one and not lamp.shaded:
                 self.fixed.append((lamp, Lamp(prim, lamp.light)))
-        ambient = self._ambient(ambients)
-        if ambient is not None:
-            path = self.writer.write_ambient(ambient).GetPath()
-            self.rows.append(_light_row("Sky", str(path), ambient, None))
+        sky = self._sky(ambients)
+        if sky is not None:
+            self._write_sky(sky)
 
     def _luminaire(self, light: legacy.Light, rule: Rule | None) -> LuminaireFile | None:
         """The photometric file that a rule gives to a light with a place."""
@@ -108,7 +128,9 @@ class LampMaker:
         axis, right = rule.three("axis"), rule.three("c0")
         if axis is None and lamp.source.kind == "point":
             note(Kind.ASSUMED, "gamma = 0 points along the light's -Z; axis says otherwise")
-        source = replace(lamp.source, direction=axis or lamp.source.direction)
+        source = lamp.source
+        if axis is not None:
+            source = replace(source, direction=axis, directions=None)
         if right is None and not file.symmetric:
             note(Kind.ASSUMED, "C = 0 points as the shortest turn leaves +X; c0 says otherwise")
         elif right is not None and across(right, source.direction) is None:
@@ -116,18 +138,59 @@ class LampMaker:
         flux = lamp.light.intensity * file.luminaire.flux()
         return replace(lamp, source=source, right=right, flux=flux)
 
-    def _ambient(self, from_lights: list[PhotometricLight]) -> PhotometricLight | None:
+    def _shaped(self, lamp: _Lamp, rule: Rule) -> _Lamp:
+        """The lamp as it is aimed where its entry's ``spread`` gives it a half space."""
+        beam = SHAPES.get(rule.values.get("spread", "sphere"))
+        if lamp.source.kind != "point" or beam is None:
+            return lamp
+        axis = rule.three("axis")
+        if axis is None:
+            text = "shines into the half space along the light's -Z; axis says otherwise"
+            self.report.add(Kind.ASSUMED, "light-aim", rule.place, lamp.source.name, text)
+            return lamp
+        return replace(lamp, source=replace(lamp.source, direction=axis, directions=None))
+
+    def _sky(self, from_lights: list[PhotometricLight]) -> Sky | None:
         """The photometry file's sky, else the sum of what the source calls ambient."""
         rule = self.sidecar.ambient
         if rule is not None:
-            return PhotometricLight(
-                "ambient",
-                rule.number("illuminance") or 0.0,
-                rule_color(rule, temperature_rgb) or (1.0, 1.0, 1.0),
-                provenance=rule.provenance,
-                rule=str(rule.place),
-                source=rule.source,
+            color = rule_color(rule, temperature_rgb)
+            if "preset" in rule.values:
+                return self.skies.make(rule, color)
+            return Sky(
+                PhotometricLight(
+                    "ambient",
+                    rule.number("illuminance") or 0.0,
+                    color or (1.0, 1.0, 1.0),
+                    provenance=rule.provenance,
+                    rule=str(rule.place),
+                    source=rule.source,
+                )
             )
+        ambient = self._ambient(from_lights)
+        return None if ambient is None else Sky(ambient)
+
+    def _write_sky(self, sky: Sky) -> None:
+        if sky.picture:
+            path = self.writer.photometry_path("Sky")
+            write_sky_dome(self.writer.stage, path, sky.light, sky.picture)
+        else:
+            path = self.writer.write_ambient(sky.light).GetPath()
+        self.rows.append(light_row("Sky", str(path), sky.light))
+        if sky.sun is None:
+            return
+        assert self.sidecar.ambient is not None
+        others = [row["name"] for row in self.rows if row["kind"] == "distant"]
+        for name in others:
+            text = "shines from a direction, beside the sky's own sun or moon; enabled = false"
+            text = f"{text} switches it off"
+            self.report.add(Kind.ASSUMED, "sky-two-suns", self.sidecar.ambient.place, name, text)
+        path = self.writer.photometry_path("Sun")
+        write_sky_sun(self.writer.stage, path, sky.sun, sky.towards)
+        self.rows.append(light_row("Sun", str(path), sky.sun))
+
+    def _ambient(self, from_lights: list[PhotometricLight]) -> PhotometricLight | None:
+        """The sum of what the source calls ambient."""
         if self.scene.ambient is not None and luminance(self.scene.ambient) > 0.0:
             estimate = self.interpreter.estimate
             color, strength = chromaticity(estimate.lux(self.scene.ambient))
@@ -174,30 +237,3 @@ def temperature_rgb(kelvin: float) -> legacy.RGB:
     """USD's own blackbody colour, luminance 1; its range is 1000 to 10000 K."""
     r, g, b = UsdLux.BlackbodyTemperatureAsRgb(min(max(kelvin, 1000.0), 10_000.0))
     return chromaticity((r, g, b))[0]
-
-
-def _light_row(
-    name: str, path: str, light: PhotometricLight, source: legacy.Light | None
-) -> dict[str, Any]:
-    unit = "cd" if light.kind in ("point", "spot") else "lx"
-    legacy_value: dict[str, Any] | None = None
-    if source is not None:
-        legacy_value = {
-            "diffuse": list(source.diffuse),
-            "candela": source.candela,
-            "lux": source.lux,
-        }
-    return {
-        "name": name,
-        "path": path,
-        "place": "",
-        "kind": light.kind,
-        "value": light.intensity,
-        "unit": unit,
-        "chromaticity": list(light.chromaticity),
-        "provenance": light.provenance,
-        "rule": light.rule,
-        "source_value": legacy_value,
-        "file": light.profile or None,
-        "flux_lm": light.intensity * 4.0 * math.pi if light.kind == "point" else None,
-    }

@@ -11,8 +11,12 @@ from __future__ import annotations
 
 import hashlib
 import re
+import shutil
 from collections import OrderedDict
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +24,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.errors import InputError, SourceRef
-from hdrusd.images import read_image, write_exr, write_png
+from hdrusd.images import MAX_PIXELS, read_small_image, write_exr, write_png
 from hdrusd.legacy.scene import RGB, Image, Texture
-from hdrusd.photometry.reflectance import reflectance_table
+from hdrusd.map_threads import MapThreads
+from hdrusd.photometry.reflectance import coded_reflectance, reflectance_table
 from hdrusd.report import Kind, Report
 from hdrusd.units import LUMINANCE_WEIGHTS
 from hdrusd.usd.material import Map
@@ -33,8 +38,17 @@ _PORTABLE = {".png", ".jpg", ".jpeg", ".exr"}
 #: Above this a half float has no value.
 _HALF_MAX = 65504.0
 
+#: Texels a side of a picture as statistics see it.
+_OVERVIEW = 2048
+
 #: Bytes of decoded pictures that are kept for the next material.
 _KEPT = 512 << 20
+
+#: First bytes of a file by which its format is told.
+_MAGIC = 8
+
+#: Pixels of a picture that is decoded ahead; larger ones wait for their turn, one by one.
+_SMALL = 1 << 24
 
 Floats = npt.NDArray[np.float64]
 
@@ -57,6 +71,22 @@ class MapWriter:
         self.written: dict[str, dict[str, object]] = {}  # file -> what it is, for the report
         self._pictures: OrderedDict[str, _Picture | None] = OrderedDict()
         self._looks: dict[str, str] = {}
+        self._threads: MapThreads[_Picture | InputError | None] | None = None
+
+    @contextmanager
+    def threaded(self, images: Iterable[Image]) -> Iterator[None]:
+        """Decode ``images`` ahead by threads, in that order, and write what is made behind.
+
+        Findings stay in the order in which maps are asked for. What writing raises comes out
+        of a later call, or of the end of the block, when every file is there.
+        """
+        named = ((key, image) for image in images if (key := self._key(image)) is not None)
+        wanted = ((key, partial(_decoded, image, _SMALL)) for key, image in named)
+        try:
+            with MapThreads(wanted) as self._threads:
+                yield
+        finally:
+            self._threads = None
 
     def look(self, texture: Texture) -> Map | None:
         """A copy of the image as it was; None where it is missing or broken."""
@@ -80,29 +110,32 @@ class MapWriter:
             return None
         name = _name(texture.image, "R", f"{key}|{gamma!r}|{diffuse!r}")
         if name not in self.written:
+            clipped = 0
             if picture.pixels.dtype == np.uint8 and min(diffuse) >= 0.0 and max(diffuse) <= 1.0:
-                color: npt.NDArray[Any] = _coded(picture.pixels, gamma, diffuse)
-                wrong: npt.NDArray[Any] = np.zeros(1, np.bool_)  # T and D are at most 1, so is R
+                # T and D are at most 1, so is R.
+                work = partial(_write_coded, self.folder / name, picture.pixels, gamma, diffuse)
+                self._do(8 * picture.pixels.size, work)
             else:
                 color = linear(picture, gamma) * np.asarray(diffuse)
                 wrong = np.any((color > 1.0) | (color < 0.0), axis=-1)
-            if wrong.any():
-                self.report.add(
-                    Kind.CLAMPED,
-                    "reflectance-clipped",
-                    place,
-                    thing,
-                    f"{texture.image.name}: reflectance outside 0 to 1 in "
-                    f"{100.0 * float(wrong.mean()):.3g} % of the texels ({float(color.min()):.4g} "
-                    f"to {float(color.max()):.4g}); clipped",
-                )
-            self._write(name, np.clip(color, 0.0, 1.0) if wrong.any() else color, picture)
+                clipped = int(wrong.sum())
+                if clipped:
+                    self.report.add(
+                        Kind.CLAMPED,
+                        "reflectance-clipped",
+                        place,
+                        thing,
+                        f"{texture.image.name}: reflectance outside 0 to 1 in "
+                        f"{100.0 * float(wrong.mean()):.3g} % of the texels "
+                        f"({float(color.min()):.4g} to {float(color.max()):.4g}); clipped",
+                    )
+                self._write(name, np.clip(color, 0.0, 1.0) if clipped else color, picture)
             self.written[name] = {
                 "kind": "reflectance",
                 "image": texture.image.name,
                 "gamma": gamma,
                 "diffuse": list(diffuse),
-                "clipped_texels": int(wrong.sum()),
+                "clipped_texels": clipped,
             }
         return Map(f"{self.prefix}/{name}", texture, raw=True)
 
@@ -116,9 +149,7 @@ class MapWriter:
         picture = None if key is None else self._read(texture.image, key)
         if key is None or picture is None:
             return None
-        # What the channels add to the luminance where the lamp is not white; their sum is 1.
-        weights = np.multiply(LUMINANCE_WEIGHTS, emission)
-        weights = weights / weights.sum() if weights.sum() > 0.0 else np.array(LUMINANCE_WEIGHTS)
+        weights = _weights(emission)
         hue = tuple(np.round(weights, 9).tolist()) if peak else ()
         name = _name(texture.image, "L", f"{key}|{gamma!r}|{peak}|{hue}")
         if name not in self.written:
@@ -144,6 +175,48 @@ class MapWriter:
             }
         return Map(f"{self.prefix}/{name}", texture, raw=True, scale=emission)
 
+    def relative_luminance(
+        self, texture: Texture, gamma: float, emission: RGB, *, peak: bool
+    ) -> Floats | None:
+        """(h, w) of an emission map as ``luminance`` writes it: 1 is the luminance of ``emission``.
+
+        None where it cannot be had.
+        """
+        key = self._key(texture.image)
+        picture = None if key is None else self._read(texture.image, key)
+        if picture is None:
+            return None
+        values = linear(picture, gamma) @ _weights(emission)
+        top = float(values.max(initial=0.0))
+        return np.clip(values / top if peak and top > 0.0 else values, 0.0, _HALF_MAX)
+
+    def coded(self, image: Image, *, stated: bool) -> bool:
+        """Whether a picture's texels are codes for a screen, as USD's sourceColorSpace has it.
+
+        ``stated``: the stage says sRGB; else it leaves it to the file ("auto"), and 8-bit
+        pictures of three colours are codes.
+        """
+        key = self._key(image)
+        picture = None if key is None else self._read(image, key)
+        if picture is None:
+            return False
+        color = picture.pixels.dtype == np.uint8 and picture.pixels.shape[2] >= 3
+        return picture.integers if stated else color
+
+    def overview(self, image: Image, gamma: float) -> tuple[Floats, Floats | None] | None:
+        """T^gamma (h, w, 3) and alpha (h, w) or None, every k-th texel of what is too large."""
+        key = self._key(image)
+        picture = None if key is None else self._read(image, key)
+        if picture is None:
+            return None
+        step = -(-max(picture.pixels.shape[:2]) // _OVERVIEW)
+        pixels = picture.pixels[::step, ::step]
+        color = linear(_Picture(pixels, picture.integers), gamma)
+        if pixels.shape[2] not in (2, 4):
+            return color, None
+        alpha = np.nan_to_num(pixels[..., -1].astype(np.float64))
+        return color, np.clip(alpha / 255.0 if pixels.dtype == np.uint8 else alpha, 0.0, 1.0)
+
     def _write(self, name: str, color: npt.NDArray[Any], picture: _Picture) -> None:
         """Colour (h, w, 3) with the picture's own alpha, as half floats."""
         pixels, channels = picture.pixels, picture.pixels.shape[2]
@@ -151,7 +224,14 @@ class MapWriter:
             alpha = pixels[..., channels - 1 :].astype(np.float64)
             alpha = alpha / 255.0 if pixels.dtype == np.uint8 else alpha
             color = np.concatenate([color, np.clip(np.nan_to_num(alpha), 0.0, 1.0)], axis=-1)
-        write_exr(self.folder / name, color, half=True, luminance=False)
+        self._do(color.nbytes, partial(_write_map, self.folder / name, color))
+
+    def _do(self, size: int, work: Callable[[], None]) -> None:
+        """Have a file written, which holds ``size`` bytes until then."""
+        if self._threads is None:
+            work()
+        else:
+            self._threads.submit(size, work)
 
     def _copy(self, image: Image, key: str) -> str | None:
         picture = self._read(image, key)
@@ -159,15 +239,16 @@ class MapWriter:
             return None
         data = image.data
         if data is None and image.path is not None:
-            data = image.path.read_bytes()
+            with image.path.open("rb") as file:
+                data = file.read(_MAGIC)
         suffix = _suffix(data)
-        if data is not None and suffix in _PORTABLE:
+        if suffix in _PORTABLE:
             name = _name(image, "", key, suffix)
-            (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
-            (self.folder / name).write_bytes(data)
+            self._do(0, partial(_write_copy, self.folder / name, image))
         else:
             name = _name(image, "", key, ".png")
-            write_png(self.folder / name, _eight_bit(picture.pixels))
+            codes = _eight_bit(picture.pixels)
+            self._do(codes.nbytes, partial(write_png, self.folder / name, codes))
         self.written.setdefault(name, {"kind": "look", "image": image.name})
         return name
 
@@ -181,7 +262,7 @@ class MapWriter:
 
     def _read(self, image: Image, key: str) -> _Picture | None:
         if key not in self._pictures:
-            self._pictures[key] = self._decode(image)
+            self._pictures[key] = self._decode(image, key)
             while self._size() > _KEPT and len(self._pictures) > 1:
                 self._pictures.popitem(last=False)
         return self._pictures[key]
@@ -189,25 +270,50 @@ class MapWriter:
     def _size(self) -> int:
         return sum(p.pixels.nbytes for p in self._pictures.values() if p is not None)
 
-    def _decode(self, image: Image) -> _Picture | None:
-        if image.pixels is not None:
-            return _Picture(image.pixels.reshape(*image.pixels.shape[:2], -1), integers=True)
-        path = image.path or Path(_stem(image) + (_suffix(image.data) or ".img"))
-        try:
-            found = read_image(path, image.data)
-        except InputError as problem:
-            self.report.add(Kind.INVALID, "image-broken", image.source, image.name, problem.problem)
+    def _decode(self, image: Image, key: str) -> _Picture | None:
+        found = None if self._threads is None else self._threads.take(key)
+        if found is None:
+            found = _decoded(image, MAX_PIXELS)
+        if isinstance(found, InputError):
+            self.report.add(Kind.INVALID, "image-broken", image.source, image.name, found.problem)
             return None
-        return _Picture(found.pixels, found.integers)
+        return found
 
 
-def _coded(pixels: npt.NDArray[np.generic], gamma: float, diffuse: RGB) -> npt.NDArray[np.float16]:
-    """R of 8-bit codes, (h, w, 3) half floats: a table a channel, no arithmetic a texel."""
-    out = np.empty((*pixels.shape[:2], 3), np.float16)
-    for channel, factor in enumerate(diffuse):
-        table = reflectance_table(gamma, factor).astype(np.float16)
-        out[..., channel] = table[pixels[..., channel if pixels.shape[2] >= 3 else 0]]
-    return out
+def _decoded(image: Image, most: int) -> _Picture | InputError | None:
+    """The picture, or why there is none; None for one of more than ``most`` pixels."""
+    if image.pixels is not None:
+        return _Picture(image.pixels.reshape(*image.pixels.shape[:2], -1), integers=True)
+    path = image.path or Path(_stem(image) + (_suffix(image.data) or ".img"))
+    try:
+        found = read_small_image(path, image.data, most)
+    except InputError as problem:
+        return problem
+    return None if found is None else _Picture(found.pixels, found.integers)
+
+
+def _write_map(path: Path, color: npt.NDArray[Any]) -> None:
+    """Half floats by the compression that is quickest and smallest on what had 256 codes."""
+    write_exr(path, color, half=True, luminance=False, compression="piz")
+
+
+def _write_coded(path: Path, codes: npt.NDArray[Any], gamma: float, diffuse: RGB) -> None:
+    _write_map(path, coded_reflectance(codes, gamma, diffuse))
+
+
+def _write_copy(path: Path, image: Image) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if image.path is None:
+        path.write_bytes(image.data or b"")
+    else:
+        shutil.copyfile(image.path, path)
+
+
+def _weights(emission: RGB) -> Floats:
+    """What the channels of a map add to the luminance of a lamp that is not white; sum 1."""
+    weights = np.multiply(LUMINANCE_WEIGHTS, emission)
+    total = weights.sum()
+    return np.asarray(weights / total if total > 0.0 else LUMINANCE_WEIGHTS, np.float64)
 
 
 def linear(picture: _Picture, gamma: float) -> Floats:
@@ -238,7 +344,7 @@ def _bytes(pixels: npt.NDArray[np.uint8] | None) -> bytes:
 
 def _suffix(data: bytes | None) -> str:
     """The format by its first bytes; a file's own suffix is not believed."""
-    magic = (data or b"")[:8]
+    magic = (data or b"")[:_MAGIC]
     known = {b"\x89PNG": ".png", b"\xff\xd8\xff": ".jpg", b"v/1\x01": ".exr", b"DDS ": ".dds"}
     for start, suffix in known.items():
         if magic.startswith(start):

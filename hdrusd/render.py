@@ -14,15 +14,16 @@ import numpy.typing as npt
 from pxr import Tf, UsdGeom
 
 from hdrusd.by_products import ByProducts, playback_rate
-from hdrusd.course import Checkpoints, Course, Known, state_text
+from hdrusd.course import Checkpoints, Course, Known, note_cuts, state_text
 from hdrusd.display import first_to_see
 from hdrusd.errors import HdrusdError, InputError, SourceRef
 from hdrusd.eye.mesopic import mesopic_layer
 from hdrusd.eye.scotopic import scotopic
 from hdrusd.eye.screen import Screen
-from hdrusd.frame_header import lamps_text, most_dazzling
+from hdrusd.frame_header import field_of_view, lamps_text
 from hdrusd.frame_io import Writer
 from hdrusd.frames import frame_path
+from hdrusd.glare.dazzling import most_dazzling
 from hdrusd.gpu.hdr import HdrRenderer, Options
 from hdrusd.gpu.ldr import deep
 from hdrusd.gpu.program import Programs
@@ -31,13 +32,22 @@ from hdrusd.job import Job
 from hdrusd.photometry.eye_illuminance import eye_illuminance
 from hdrusd.photometry.scotopic_light import scotopic_scene
 from hdrusd.report import Kind, Report
+from hdrusd.resuming import VIEWING, check_frames, check_pictures, viewing_text
 from hdrusd.scene import Camera, Doubles, RenderScene
 from hdrusd.tonemap.operator import DEFAULT_OPERATOR, OPERATORS, Moment, Operator
 from hdrusd.usd.extract import StageReader
 from hdrusd.usd.opening import one_line_of, open_stage, usd_warnings
 from hdrusd.usd.settings import read_settings
 from hdrusd.usd.textures import TextureLoader
-from hdrusd.viewing import Eye, Sight, Viewing, reads_screen, with_exposure, with_rods
+from hdrusd.viewing import (
+    Eye,
+    Sight,
+    Viewing,
+    note_glare,
+    reads_screen,
+    with_exposure,
+    with_rods,
+)
 
 #: Width of a picture that neither the stage nor the user sizes (usdrecord's).
 DEFAULT_WIDTH = 960
@@ -59,7 +69,9 @@ class Frame:
     skipped: bool = False
     light_error: float = 0.0  # bound of merging lamps (HdrRenderer.light_error); 0: each alone
     layers: Mapping[str, npt.NDArray[np.float32]] = field(default_factory=dict)  # (h, w)
-    lamps: npt.NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 6)))  # beside it
+    lamps: npt.NDArray[np.float64] = field(
+        default_factory=lambda: np.zeros((0, 6))
+    )  # glare/veil.py
 
 
 class Renderer:
@@ -105,9 +117,12 @@ class Renderer:
             raise HdrusdError(
                 f"{width} x {height} pixels: too large for this device ({problem})"
             ) from problem
+        self._told_lamps = False
         self.viewing = self._viewing()
         self.eye: Eye | None = None
         if self.viewing is not None:
+            note_glare(self.viewing, SourceRef(job.stage), report)
+            note_cuts(job.cuts, self.times, SourceRef(job.stage), report)
             course = Course(self.viewing.operator, job.start, job.cut, job.cuts)
             self.eye = Eye(ctx, programs, self.viewing, course)
 
@@ -150,7 +165,7 @@ class Renderer:
         texture = self.hdr.render(scene)
         self.textures.publish()
         hdr, moment, ldr = self.hdr.read(), None, None
-        lamps = most_dazzling(eye_illuminance(scene))
+        lamps = self._lamps(scene, hdr)
         if self.eye is not None and self.viewing is not None:
             sight = self._sight(self.viewing, camera, time, lamps)
             if rods is not None and self.viewing.night_colour:
@@ -160,6 +175,19 @@ class Renderer:
             moment, ldr = shown.moment, shown.picture
         error, layers = self.hdr.light_error, self._layers(hdr, rods)
         return Frame(time, hdr, ldr, moment, camera, light_error=error, layers=layers, lamps=lamps)
+
+    def _lamps(self, scene: RenderScene, hdr: npt.NDArray[np.float32]) -> Doubles:
+        """Lamps that the frame does not hold (glare/veil.py): beside it, or below a pixel."""
+        found = np.concatenate([eye_illuminance(scene), self.hdr.small_lamps(hdr)])
+        rows, merged, lost = most_dazzling(found)
+        if merged and not self._told_lamps:
+            self._told_lamps = True
+            text = (
+                f"{merged} lamps below a pixel or beside the frame veil it together, within a "
+                f"degree; {100.0 * lost:.2g} % of the light at the eye are left out"
+            )
+            self.report.add(Kind.ASSUMED, "glare-lamps", SourceRef(self.job.stage), "", text)
+        return rows
 
     def _sight(self, viewing: Viewing, camera: Camera, time: float, lamps: Doubles) -> Sight:
         """What the eye has to know of a frame."""
@@ -279,11 +307,15 @@ def render_sequence(ctx: moderngl.Context, job: Job, report: Report) -> Iterator
         for time in renderer.times
     ]
     states = _checkpoints(renderer)
+    if job.resume:
+        done = [file for _, files in outputs if _all_there(files) for file in files]
+        check_frames(done, _drawn(job), renderer.size, report)
+        check_pictures(done, renderer.viewing.setup() if renderer.viewing else {}, report)
     begin, eye = 0, renderer.eye
     in_time = eye is not None and eye.course.operator.advance is not None
     if job.resume and in_time and eye is not None:
-        done = [_all_there(files) for _, files in outputs]
-        begin = first_to_see(renderer.times, done, eye.course, states)
+        there_yet = [_all_there(files) for _, files in outputs]
+        begin = first_to_see(renderer.times, there_yet, eye.course, states)
     with Writer() as writer, _by_products(renderer) as beside:
         try:
             for index, (time, files) in enumerate(outputs):
@@ -368,16 +400,19 @@ def _write(renderer: Renderer, frame: Frame, writer: Writer) -> None:
     if job.png is not None and frame.ldr is not None:
         path = frame_path(job.png, frame.time)
         pq = frame.moment is not None and deep(frame.moment.screen)
-        writer.submit(write_png, path, frame.ldr, pq=pq)
+        texts = {VIEWING: viewing_text(renderer.viewing.setup())} if renderer.viewing else None
+        writer.submit(write_png, path, frame.ldr, pq=pq, texts=texts)
 
 
-def field_of_view(camera: Camera) -> tuple[float, float] | None:
-    """Width and height of a camera's picture in degrees; None for an orthographic one."""
-    if camera.orthographic:
-        return None
-    left, right, bottom, top = camera.window
-    across = math.degrees(2.0 * math.atan((right - left) / 2.0))
-    return across, math.degrees(2.0 * math.atan((top - bottom) / 2.0))
+def _drawn(job: Job) -> dict[str, Any]:
+    """What of a frame's header is the same for all of a job."""
+    return {
+        "hdrusd:reflection": job.reflection,
+        "hdrusd:stage": job.stage.name,
+        "hdrusd:shadows": "maps" if job.shadows else "none",
+        "hdrusd:samples": job.samples,
+        "hdrusd:skySamples": job.sky_samples,
+    }
 
 
 def exr_header(renderer: Renderer, frame: Frame) -> dict[str, Any]:
@@ -394,13 +429,9 @@ def exr_header(renderer: Renderer, frame: Frame) -> dict[str, Any]:
         "worldToNDC": ndc.astype(np.float32),
         "hdrusd:timeCodesPerSecond": float(stage.GetTimeCodesPerSecond()),
         "hdrusd:camera": camera.name,
-        "hdrusd:reflection": job.reflection,
-        "hdrusd:stage": job.stage.name,
         "hdrusd:lights": "merged" if frame.light_error else "exact",
         "hdrusd:lightErrorBound": frame.light_error,
-        "hdrusd:shadows": "maps" if job.shadows else "none",
-        "hdrusd:samples": job.samples,
-        "hdrusd:skySamples": job.sky_samples,
+        **_drawn(job),
     }
     if math.isfinite(frame.time):  # the default time is no number
         header["hdrusd:frame"] = float(frame.time)

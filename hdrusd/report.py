@@ -93,14 +93,18 @@ class Report:
         """The distinct codes, for tests and ``--strict`` decisions."""
         return {code for _, code, _ in self._counts}
 
-    def summary(self) -> str:
-        """One line: how many of each kind, those that are not listed too."""
-        if not self._counts:
-            return "no findings"
+    def kinds(self) -> dict[str, int]:
+        """How many of each kind, those that are not listed too, by the kinds' names."""
         kinds: Counter[str] = Counter()
         for (kind, _, _), count in self._counts.items():
             kinds[str(kind)] += count
-        parts = ", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items()))
+        return dict(sorted(kinds.items()))
+
+    def summary(self) -> str:
+        """One line: how many of each kind."""
+        if not self._counts:
+            return "no findings"
+        parts = ", ".join(f"{n} {kind}" for kind, n in self.kinds().items())
         return f"{len(self)} findings: {parts}"
 
     def as_dict(self) -> dict[str, Any]:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from math import pi
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
+from hdrusd.account.wear import texels
 from hdrusd.legacy.scene import RGB, LegacyScene, Material, Texture
 from hdrusd.maps import MapWriter
+from hdrusd.photometry.confidence import confidence
 from hdrusd.photometry.interpret import Interpreter, luminance
+from hdrusd.photometry.lamp_area import LampArea
 from hdrusd.photometry.sidecar import Rule, Sidecar
 from hdrusd.report import Kind, Report
 from hdrusd.units import TEXTURE_GAMMA
@@ -16,8 +23,13 @@ from hdrusd.usd.material import Map, Surface
 from hdrusd.usd.mesh import COLOR_PRIMVAR
 from hdrusd.usd.preview import roughness_from_shininess
 
+Array = npt.NDArray[Any]
+
 #: Keys of a photometry rule that say how a surface reflects.
 _REFLECTION = frozenset({"diffuse", "gamma", "specular", "roughness", "shininess"})
+
+#: The brightest surface that is written, cd/m2; 32-bit floats end at 3e38.
+_BRIGHTEST = 1e30
 
 #: TexEnv modes in which the texture covers the material's colour.
 _COVERING = ("REPLACE", "DECAL")
@@ -77,21 +89,35 @@ class SurfaceMaker:
             pbr["roughness"] = roughness
         return replace(material, specular=specular or material.specular, pbr=pbr)
 
-    def surface(self, material: Material, *, colored: bool) -> Surface:
+    def surface(
+        self,
+        material: Material,
+        *,
+        colored: bool,
+        area: Callable[[], LampArea | None] = lambda: None,
+        places: Callable[[Texture], Array | None] = lambda texture: None,
+    ) -> Surface:
         """A material of ``glossed`` in photometric terms.
 
-        ``colored``: worn by meshes with vertex colours.
+        ``colored``: worn by meshes with vertex colours. ``area``: of a lamp that wears it, asked
+        where the photometry file does not say. ``places``: texture coordinates (n, 2) spread
+        evenly over all that wears it, None where that is not known.
         """
         rule = self.sidecar.match("material", material.name)
         gamma = self._gamma(rule)
-        diffuse = (rule and rule.three("diffuse")) or material.diffuse
+        stated_d = rule.three("diffuse") if rule is not None else None
+        diffuse = stated_d or material.diffuse
         textured = material.diffuse_map
-        if textured is not None and textured.mode in _COVERING:
+        if stated_d is None and textured is not None and textured.mode in _COVERING:
             diffuse = (1.0, 1.0, 1.0)
         hdr = bool(rule and rule.values.get("hdr_texture"))
-        emission, provenance, name, source = self.interpreter.emission(material, rule)
-        stated = rule.number("luminance") if rule is not None else None
+        mean, how = self._mean_luminance(material, rule, area)
+        emission, provenance, name, source = self.interpreter.emission(material, rule, mean)
+        name += how
+        stated = rule.number("luminance") if rule is not None and mean is None else mean
         lamp = stated is not None and stated > 0.0
+        if lamp and mean is not None:
+            emission = self._at_one(material, emission, gamma, places, hdr=hdr)
         emission_map = self._emission_map(material, emission, gamma, hdr=hdr)
         reflectance = None
         if textured is not None and not lamp:
@@ -105,6 +131,9 @@ class SurfaceMaker:
         bright = any(emission)
         if rule is not None and not bright and _REFLECTION & rule.values.keys():
             provenance, name, source = rule.provenance, str(rule.place), rule.source
+        elif not bright and not name:
+            name = f"R = T^{gamma:g} D" if reflectance is not None else "R = D"
+            provenance, source = "estimated", "Petit and Bremond 2010, section 3"
         return Surface(
             diffuse=diffuse,
             gamma=gamma,
@@ -117,7 +146,7 @@ class SurfaceMaker:
             replaces_reflection=lamp,
             opacity_map=self._opacity(material),
             vertex_color=COLOR_PRIMVAR if colored else "",
-            provenance=provenance if bright or name else "",
+            provenance=provenance,
             rule=name,
             source=source,
         )
@@ -127,10 +156,83 @@ class SurfaceMaker:
         stated = (self.gamma, own, self.sidecar.gamma)
         return next((gamma for gamma in stated if gamma is not None), TEXTURE_GAMMA)
 
+    def _mean_luminance(
+        self, material: Material, rule: Rule | None, area: Callable[[], LampArea | None]
+    ) -> tuple[float | None, str]:
+        """cd/m2 over all of a lamp and how they came about; None where nothing says.
+
+        L = I / A, A as seen from the axis, or L = Phi / (pi S), S the luminous surface, of a
+        Lambert emitter.
+        """
+        keys = ("candela", "lumens")
+        if rule is None or "luminance" in rule.values or not set(keys) & rule.values.keys():
+            return None, ""
+        key = next(key for key in keys if key in rule.values)
+        amount, size = rule.number(key), rule.number("area")
+        assert amount is not None
+        if size is None:
+            lamp = area()
+            if lamp is None:
+                text = f"{rule.place} says {key}, and no mesh that wears it has an area; want area"
+                self._note(material, Kind.MISSING, "emission-area", text)
+                return None, ""
+            seen = key == "candela"
+            size = lamp.seen if seen else lamp.surface
+            what = "seen along its mean normal" if seen else "of surface"
+            places = f", the mean of {lamp.places} meshes" if lamp.places > 1 else ""
+            if lamp.most - lamp.least > 1e-3 * lamp.most:
+                places += f" of {lamp.least:.4g} to {lamp.most:.4g} m2 seen"
+            text = f"{size:.4g} m2 {what}{places}, each taken for one lamp; area says otherwise"
+            self._note(material, Kind.ASSUMED, "emission-area", text)
+        nits = amount / size if key == "candela" else amount / (pi * size)
+        if nits > _BRIGHTEST:
+            text = f"{rule.place}: {nits:g} cd/m2 is beyond 32-bit floats; not used"
+            self._note(material, Kind.INVALID, "emission-area", text)
+            return None, ""
+        return nits, f", {amount:g} {'cd' if key == 'candela' else 'lm'} of {size:.4g} m2"
+
+    def _at_one(
+        self,
+        material: Material,
+        emission: RGB,
+        gamma: float,
+        places: Callable[[Texture], Array | None],
+        *,
+        hdr: bool,
+    ) -> RGB:
+        """Emission at 1.0 of its texture, so that its mean over the lamp is as stated.
+
+        I = A mean(L), and L = L1 t with t of the texture: L1 = I / (A mean(t)). Of an HDR texture,
+        whose brightest texel is 1, mean(t) is mean / peak and L1 the peak of the lamp.
+        """
+        texture = self._glow(material, hdr=hdr)
+        if texture is None:
+            return emission
+        values = self.maps.relative_luminance(texture, gamma, emission, peak=hdr)
+        if values is None:
+            return emission
+        uv = places(texture)
+        mean = _mean(values, texture, uv)
+        if not mean or max(emission) > _BRIGHTEST * mean:
+            text = "black in the lamp's colour; the lamp would not shine, so its mean is not held"
+            self._note(material, Kind.INVALID, "emission-texture", text)
+            return emission
+        where = "over the whole picture, as where the lamp shows it is not known"
+        if uv is not None:
+            where = "where the lamp shows it"
+        text = f"the picture has {mean:.4g} of its full luminance on average {where}"
+        self._note(material, Kind.ASSUMED, "emission-texture", text)
+        red, green, blue = (c / mean for c in emission)
+        return red, green, blue
+
+    @staticmethod
+    def _glow(material: Material, *, hdr: bool) -> Texture | None:
+        return material.emission_map or (material.diffuse_map if hdr else None)
+
     def _emission_map(
         self, material: Material, emission: RGB, gamma: float, *, hdr: bool
     ) -> Map | None:
-        texture = material.emission_map or (material.diffuse_map if hdr else None)
+        texture = self._glow(material, hdr=hdr)
         if texture is not None and any(emission):
             return self.maps.luminance(texture, gamma, emission, peak=hdr)
         if hdr:
@@ -179,6 +281,14 @@ class SurfaceMaker:
         self.report.add(kind, code, material.source, material.name, text)
 
 
+def _mean(values: Array, texture: Texture, uv: Array | None) -> float:
+    """Of a picture (h, w), where it is shown."""
+    if uv is None:
+        return float(values.mean())
+    row, column, there = texels(texture, uv, values.shape[1], values.shape[0])
+    return float(np.where(there, values[row, column], 0.0).mean())
+
+
 def colored_materials(scene: LegacyScene) -> set[int]:
     """Materials worn by a mesh with vertex colours that are not all white."""
     colored: set[int] = set()
@@ -193,7 +303,7 @@ def colored_materials(scene: LegacyScene) -> set[int]:
 def material_rows(
     materials: Sequence[Material], paths: Sequence[object], surfaces: Sequence[Surface]
 ) -> list[dict[str, Any]]:
-    """The account of the materials for the report."""
+    """The account of the materials for the report, but for where they are worn."""
     return [
         {
             "name": material.name,
@@ -203,8 +313,17 @@ def material_rows(
             "specular": list(surface.specular),
             "reflectance_map": surface.diffuse_map.file if surface.diffuse_map else None,
             "luminance_cd_m2": surface.luminance,
-            "provenance": surface.provenance or None,
-            "rule": surface.rule or None,
+            "replaces_reflection": surface.replaces_reflection,
+            "faces": 0,  # these five: account/reflectances.py, where the faces are known
+            "area_m2": 0.0,
+            "surface_class": None,
+            "reflectance": None,
+            "doubts": [],
+            "place": str(material.source),
+            "provenance": surface.provenance,
+            "rule": surface.rule,
+            "source": surface.source,
+            "confidence": confidence(surface.provenance, surface.rule, surface.source),
         }
         for material, path, surface in zip(materials, paths, surfaces, strict=True)
     ]

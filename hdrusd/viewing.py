@@ -35,6 +35,7 @@ from hdrusd.colour import (
     to_rec2020,
 )
 from hdrusd.course import Course
+from hdrusd.errors import SourceRef
 from hdrusd.eye.acuity import acuity_blur
 from hdrusd.eye.foveal import Foveal, default_field
 from hdrusd.eye.observer import Observer
@@ -47,6 +48,7 @@ from hdrusd.gpu.ldr import ToneMapper, deep
 from hdrusd.gpu.measure import Measurer
 from hdrusd.gpu.program import Programs
 from hdrusd.gpu.vision import AcuityPass
+from hdrusd.report import Kind, Report
 from hdrusd.tonemap.falsecolour import OPERATOR as FALSE_COLOUR
 from hdrusd.tonemap.falsecolour import PALETTES
 from hdrusd.tonemap.legend import SMALLEST, paint_legend
@@ -109,8 +111,9 @@ class Sight:
     ``time`` in s, ``frame`` its number, ``camera`` the camera's name; ``field``: width and height
     in degrees, None where the camera is unknown; ``parameters`` of the operator where they are
     this frame's own.
-    ``lamps`` (n, 6) are outside the frame and dazzle all the same (glare/veil.py). ``rods``: the
-    frame's fourth channel is its white-relative scotopic luminance (``with_rods``).
+    ``lamps`` (n, 6): those that the frame does not hold and that dazzle all the same, and pixels
+    that show some of them (glare/veil.py). ``rods``: the frame's fourth channel is its
+    white-relative scotopic luminance (``with_rods``).
     """
 
     time: float = 0.0
@@ -247,6 +250,18 @@ class ReferenceEye:
         stats = statistics(rgb, need, angles) if (need := self.viewing.needs(moment)) else None
         moment = replace(moment, statistics=stats)
         return self.course.advance(moment, sight.time, sight.frame, sight.camera)
+
+
+def note_glare(viewing: Viewing, place: SourceRef, report: Report) -> None:
+    """A finding for an observer's age or pigment that the model of glare does not know."""
+    usual, observer, glare = Observer(), viewing.observer, viewing.glare
+    if glare is None or glare.by_observer:
+        return
+    said = {name: getattr(observer, name) for name in ("age", "pigment")}
+    other = [f"{n} {value:g}" for n, value in said.items() if value != getattr(usual, n)]
+    if other:
+        text = f"observer's {', '.join(other)}: the veil of {glare.name} is the same for all"
+        report.add(Kind.DROPPED, "glare-observer", place, "", text)
 
 
 def _foveal(moment: Moment) -> Foveal:

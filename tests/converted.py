@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from pxr import Usd, UsdShade
+from report_schema import problems
 
 from hdrusd.conversion import Options, Result
 from hdrusd.convert import convert
@@ -18,8 +19,10 @@ _STAGES: deque[Usd.Stage] = deque(maxlen=4)
 
 
 def run(source: Path, output: Path | None = None, **options: Any) -> Result:
-    """Convert beside the source, or to ``output``."""
-    return convert(source, output or source.with_suffix(".usda"), Options(**options))
+    """Convert beside the source, or to ``output``; the report must fit its schema."""
+    result = convert(source, output or source.with_suffix(".usda"), Options(**options))
+    assert problems(result.as_dict()) == []
+    return result
 
 
 def opened(result: Result) -> Usd.Stage:

@@ -38,7 +38,7 @@ from hdrusd.images import read_exr
 
 from .gallery import PRIVATE, write_sheets
 
-LEGACY = (".3ds", ".flt", ".gltf", ".glb", ".obj", ".osg", ".osgt", ".dae", ".zae")
+LEGACY = (".3ds", ".fbx", ".flt", ".gltf", ".glb", ".obj", ".osg", ".osgt", ".dae", ".zae")
 STAGES = (".usda", ".usdc", ".usd", ".usdz")
 
 #: Files whose picture is black: the camera of this one stands in a hall and ends before its walls.

@@ -26,11 +26,11 @@ LAYERS = (
     {"glare", "photometry", "tonemap"},
     {"importers", "images"},
     {"usd", "gpu", "adaptation_log", "bracket", "contact_sheet", "course", "video"}
-    | {"frame_header", "frame_io"},
-    {"candela_plot", "conversion", "delivery", "inspection", "job", "luminaires", "maps"}
-    | {"validation", "viewing"},
-    {"by_products", "lamps", "surfaces"},
-    {"display"},
+    | {"frame_header", "frame_io", "map_threads"},
+    {"account", "added_lamps", "candela_plot", "delivery", "inspection", "job", "luminaires"}
+    | {"maps", "recipe", "skies", "validation", "viewing"},
+    {"by_products", "conversion", "lamps", "resuming", "surfaces"},
+    {"display", "overlay"},
     {"convert", "render"},
     {"testing"},
     {"cli"},
@@ -38,7 +38,7 @@ LAYERS = (
 
 #: Who may import what does not come with Python; NumPy is everybody's.
 THIRD_PARTY = {
-    "pxr": {"schemas", "usd", "validation", "convert", "lamps", "render"},
+    "pxr": {"schemas", "usd", "validation", "convert", "lamps", "overlay", "render"},
     "moderngl": {"gpu", "render", "viewing"},
     "OpenEXR": {"images"},
     "OpenImageIO": {"bracket", "contact_sheet", "images"},
@@ -46,6 +46,7 @@ THIRD_PARTY = {
     "av": {"video"},
     "matplotlib": {"adaptation_log", "candela_plot"},
     "click": {"cli"},
+    "ufbx": {"importers"},  # in a worker process only: tests/importers/test_fbx.py
     "numpy": set().union(*LAYERS),
 }
 

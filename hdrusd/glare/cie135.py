@@ -64,4 +64,5 @@ MODEL = GlareModel(
     title="CIE total glare function",
     cite="Vos and van den Berg, CIE 135/1-6, 1999",
     psf=_psf,
+    by_observer=True,
 )

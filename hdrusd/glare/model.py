@@ -25,6 +25,8 @@ class GlareModel:
     ``shares(cosine, weight)``: for a scatter that depends on what else is seen. Of the
     luminance of sample j, what sample i gets, (n, m); ``cosine`` (n, m) of the angles between
     samples, ``weight`` (m,) the part of each that lies in the frame.
+
+    ``by_observer``: whether age and pigment change it.
     """
 
     name: str
@@ -32,6 +34,7 @@ class GlareModel:
     cite: str
     psf: Callable[[npt.ArrayLike, Observer], Array] | None = None
     shares: Callable[[Array, Array], Array] | None = None
+    by_observer: bool = False
 
 
 #: The model where nobody names one.

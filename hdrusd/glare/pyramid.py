@@ -43,13 +43,11 @@ from hdrusd.errors import HdrusdError
 from hdrusd.eye.observer import Observer
 from hdrusd.eye.scotopic import scotopic, white_relative
 from hdrusd.glare.model import Array, GlareModel
-from hdrusd.glare.veil import LAMP, kernel, pixel_angle, plane
+from hdrusd.glare.splats import MARGIN, as_lamps, level_size, shown_pixels, splats
+from hdrusd.glare.veil import kernel, pixel_angle, plane
 
 #: Degrees between which the Gaussians are fitted.
 NARROWEST, WIDEST = 0.02, 8.0
-
-#: Texels around the frame that a level has too: light of the frame lies in them, and lamps.
-MARGIN = 2
 
 #: Largest relative error of the fit that a first level may have.
 _TOLERANCE = 0.055
@@ -186,7 +184,7 @@ class Pyramid:
 
     def level_size(self, level: int) -> tuple[int, int]:
         """(w, h) of a level in texels, without its margin."""
-        return _level_size(self.size, level)
+        return level_size(self.size, level)
 
     def wide_light(self, texels: Array, lamps: Array | None = None) -> Array:
         """What the texels of ``last`` (h, w, 4), bottom row first, and lamps (k, 6) add to them.
@@ -199,35 +197,6 @@ class Pyramid:
                 spread = _looked_up(self.tables, self.least, self.rays, rows[:, :3])
                 out[:, :3] += spread @ rows[:, 3:].astype(np.float32)
         return np.asarray(out.reshape(texels.shape))
-
-    def splats(self, level: int, lamps: Array) -> tuple[Array, Array]:
-        """Lamps (k, 6) as texels of a level: column and row (n, 2) with the margin,
-
-        and the luminance (n, 3) to add there. A lamp is shared out as the levels do with a
-        pixel, in the end by a quadratic B-spline over 3 x 3 texels. Lamps that are too far
-        from the frame to reach it by this level give none.
-        """
-        ahead = lamps[lamps[:, 2] < -1e-3]
-        size, half = np.array(self.size), np.array(plane(self.field))
-        at = ahead[:, :2] / -ahead[:, 2:3]
-        place = (at / half + 1.0) * 0.5 * size / 2.0**level - 0.5 + MARGIN
-        limits = np.array(self.level_size(level)) + 2 * MARGIN
-        near = np.all((place > -2.0) & (place < limits + 1), axis=1)
-        ahead, place = ahead[near], place[near]
-        # As a pixel there would have it: lux over the solid angle of a texel.
-        area = 4.0 * math.prod(half) / math.prod(self.size) * 4.0**level
-        luminance = ahead[:, 3:] / (area * np.abs(ahead[:, 2:3]) ** 3)
-        centre = np.rint(place)
-        off = place - centre
-        share = np.stack([0.5 * (0.5 - off) ** 2, 0.75 - off**2, 0.5 * (0.5 + off) ** 2])
-        places, lights = [], []
-        for y in range(3):
-            for x in range(3):
-                places.append(centre + np.array([x - 1, y - 1]))
-                lights.append(luminance * (share[x, :, 0] * share[y, :, 1])[:, None])
-        texels = np.concatenate(places).astype(np.int64)
-        inside = np.all((texels >= 0) & (texels < limits), axis=1)
-        return texels[inside], np.concatenate(lights)[inside]
 
     def plane_steps(self, level: int) -> tuple[tuple[float, float], tuple[float, float]]:
         """Of a level, at distance 1: the corner of the frame at (0, 0), and a texel's sides."""
@@ -260,6 +229,9 @@ class Pyramid:
             raise HdrusdError(f"picture of {rgb.shape[1]} x {rgb.shape[0]}; want {self.size}")
         rows = None if lamps is None else as_lamps(lamps)
         level = np.concatenate([rgb, np.ones((*rgb.shape[:2], 1))], axis=-1)
+        if lamps is not None and self.weights.size:
+            pixels, shares = shown_pixels(lamps, self.size, self.field)
+            level[pixels[:, 1], pixels[:, 0], :3] *= 1.0 - shares
         levels = [np.pad(level, _around(MARGIN))]
         for _ in range(self.last):
             levels.append(_halved(levels[-1]))
@@ -271,7 +243,7 @@ class Pyramid:
                 veil = _enlarged(veil, source.shape[1::-1], 1, MARGIN)
             if self.weights.size:
                 if rows is not None:
-                    place, light = self.splats(k, rows)
+                    place, light = splats(k, rows, self.size, self.field)
                     np.add.at(source[..., :3], (place[:, 1], place[:, 0]), light)
                 weight = self._weights_at(k, source.shape[1::-1])
                 veil = veil + weight[..., :1] * source + weight[..., 1:] * _blurred(source)
@@ -279,16 +251,6 @@ class Pyramid:
         rods = white_relative(scotopic(veil[..., :3]))[..., None]
         added = np.concatenate([veil[..., :3], rods], axis=-1)[..., : whole.shape[2]]
         return np.asarray(((1.0 - veil[..., 3:]) * whole + added)[::-1])
-
-
-def as_lamps(lamps: npt.ArrayLike) -> Array:
-    """Rows of lamps, float64, without those that give nothing; raises HdrusdError."""
-    rows = np.asarray(lamps, np.float64)
-    if rows.ndim != 2 or rows.shape[1] != LAMP or not np.all(np.isfinite(rows)):
-        raise HdrusdError(
-            f"lamps of shape {rows.shape}; want finite rows of a direction and lux per channel"
-        )
-    return rows[np.any(rows[:, 3:] > 0.0, axis=1)]
 
 
 @lru_cache(maxsize=4)
@@ -301,7 +263,7 @@ def pyramid(
     """
     pixel = pixel_angle(size, field)
     last = 0
-    while math.prod(_level_size(size, last)) > _DENSE:
+    while math.prod(level_size(size, last)) > _DENSE:
         last += 1
     if model.psf is None:
         return _of_shares(model, size, field, last)
@@ -395,15 +357,11 @@ def _looked_up(tables: Array, least: float, a: Array, b: Array) -> Array:
     return np.asarray(flat.take(cell) * (1.0 - share) + flat.take(cell + _CELLS) * share)
 
 
-def _level_size(size: tuple[int, int], level: int) -> tuple[int, int]:
-    return -(-size[0] >> level), -(-size[1] >> level)
-
-
 def _rays(size: tuple[int, int], field: tuple[float, float], level: int) -> Array:
     """Unit vectors (n, 3) through the texels of a level and one more around, bottom row first."""
     x, y = (
         half * (2.0 * (np.arange(-1, texels + 1) + 0.5) * 2.0**level / pixels - 1.0)
-        for half, texels, pixels in zip(plane(field), _level_size(size, level), size, strict=True)
+        for half, texels, pixels in zip(plane(field), level_size(size, level), size, strict=True)
     )
     grid = np.stack([*np.meshgrid(x, y), np.full((len(y), len(x)), -1.0)], axis=-1).reshape(-1, 3)
     return np.asarray(grid / np.linalg.norm(grid, axis=1, keepdims=True))

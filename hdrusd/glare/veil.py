@@ -11,11 +11,13 @@ becomes (1 - S m) L + (f_v * L), m being the part of its own scattered light tha
 frame: what leaves the frame comes back from a world that goes on as the pixel is. So a uniform
 frame stays uniform up to its edges, and the sum over the frame stays what it was.
 
-Lamps beside the picture, as (n, 6) rows: a unit vector towards them in view space (+x right, +y up,
-the line of sight along -z) and what they give at the eye, square to their rays, lx per channel.
-Each adds E f_v(theta). They are those that the picture does not hold: outside its frame, or so
-small that its pixels cannot be trusted. A lamp that is in both is counted twice; who passes
-it sees to that. Beyond LAST degrees nothing is added.
+Lamps that the picture does not hold, as (n, 6) rows: a unit vector towards them in view space (+x
+right, +y up, the line of sight along -z) and what they give at the eye, square to their rays, lx
+per channel. Each adds E f_v(theta). They are outside its frame, or so small that its pixels cannot
+be trusted. A pixel that shows such a lamp all the same, as luck has it, is a row too: the vector
+through it, and per channel minus the share of its luminance, 0 to 1, that is a lamp's. That share
+keeps its place in the picture and is not scattered, since the lamp's own row is. Beyond LAST
+degrees nothing is added.
 """
 
 from __future__ import annotations
@@ -40,7 +42,7 @@ LAST = 100.0
 #: Degrees that a perspective picture may be wide or high.
 FIELDS = (1e-3, 179.0)
 
-#: A row of lamps: direction, and lx per channel.
+#: A row of lamps: direction, and lx per channel, or minus a pixel's shares.
 LAMP = 6
 
 

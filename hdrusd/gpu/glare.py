@@ -24,13 +24,15 @@ import numpy.typing as npt
 
 from hdrusd.eye.observer import Observer
 from hdrusd.glare.model import GlareModel
-from hdrusd.glare.pyramid import MARGIN, NODES, Pyramid, as_lamps, pyramid
+from hdrusd.glare.pyramid import NODES, Pyramid, pyramid
+from hdrusd.glare.splats import MARGIN, as_lamps, shown_pixels, splats, taken
 from hdrusd.gpu.blending import blending
 from hdrusd.gpu.program import Programs, set_uniforms
 
 _DOWN, _LEVEL = "gpu/shaders/glare_down.frag", "gpu/shaders/glare_level.frag"
 _VEIL = "gpu/shaders/glare_veil.frag"
 _LAMP = "gpu/shaders/glare_lamp.vert", "gpu/shaders/glare_lamp.frag"
+_TAKEN = "gpu/shaders/glare_taken.vert", "gpu/shaders/glare_lamp.frag"
 
 
 class GlarePass:
@@ -66,17 +68,17 @@ class GlarePass:
 
         ``hdr``: RGB(A) float texture in cd/m2, bottom row first; NaN and negative channels
         are black, A stays as it is. ``field``: width and height of the perspective picture,
-        degrees. ``lamps`` (n, 6): those that the picture does not hold (glare/veil.py); they
-        add nothing to a model without a point spread. ``rods``: A is white-relative scotopic
-        luminance, and veiled too. Raises HdrusdError for a field or
-        lamps that cannot be.
+        degrees. ``lamps`` (n, 6): those that the picture does not hold, and pixels that show
+        them all the same (glare/veil.py); they change nothing in a model without a point
+        spread. ``rods``: A is white-relative scotopic luminance, and veiled too. Raises
+        HdrusdError for a field or lamps that cannot be.
         """
         plan = pyramid(model, observer, hdr.size, field)
         rows = None if lamps is None else as_lamps(lamps)
         if self._size != hdr.size:
             self._forget()
             self._size = hdr.size
-        self._halve(hdr, plan)
+        self._halve(hdr, plan, None if lamps is None or not plan.weights.size else lamps)
         veil = self._spread(plan, rows)
         for level in range(plan.last, plan.first - 1, -1):
             if not plan.weights.size:
@@ -94,7 +96,7 @@ class GlarePass:
 
     # -- steps ---------------------------------------------------------------------------
 
-    def _halve(self, hdr: moderngl.Texture, plan: Pyramid) -> None:
+    def _halve(self, hdr: moderngl.Texture, plan: Pyramid, lamps: npt.ArrayLike | None) -> None:
         start = min(plan.first, 1)
         self._draw(
             self._frame(plan, "level", start),
@@ -103,6 +105,11 @@ class GlarePass:
             {"below": (hdr, self._texels)},
             {"texel": _texel(hdr)},
         )
+        if lamps is not None:
+            pixels, texels, shares = taken(start, *shown_pixels(lamps, plan.size, plan.field))
+            hdr.use(0)
+            points = np.concatenate([pixels, texels, shares], axis=1)
+            self._add_points(plan, start, _TAKEN, points, "2f 2f 3f", "pixel", "place", "share")
         for level in range(start + 1, plan.last + 1):
             below = self._texture(plan, "level", level - 1)
             self._draw(
@@ -131,17 +138,30 @@ class GlarePass:
         return self._wide
 
     def _splat(self, plan: Pyramid, level: int, lamps: npt.NDArray[Any]) -> None:
-        place, light = plan.splats(level, lamps)
-        if not len(place):
+        place, light = splats(level, lamps, plan.size, plan.field)
+        points = np.concatenate([place, light], axis=1)
+        self._add_points(plan, level, _LAMP, points, "2f 3f", "place", "luminance")
+
+    def _add_points(
+        self,
+        plan: Pyramid,
+        level: int,
+        files: tuple[str, str],
+        points: npt.NDArray[Any],
+        layout: str,
+        *names: str,
+    ) -> None:
+        """Add rows of what a vertex shader of points takes to the texels of a level."""
+        if not len(points):
             return
         frame = self._frame(plan, "level", level)
-        program = self.programs.get(*_LAMP)
+        program = self.programs.get(*files)
         set_uniforms(program, {"size": frame.size})
-        buffer = self.ctx.buffer(np.concatenate([place, light], axis=1).astype(np.float32))
-        points = self.ctx.vertex_array(program, [(buffer, "2f 3f", "place", "light")])
+        buffer = self.ctx.buffer(points.astype(np.float32))
+        vertices = self.ctx.vertex_array(program, [(buffer, layout, *names)])
         with self.ctx.scope(frame, moderngl.NOTHING), blending(self.ctx, frame):
-            points.render(moderngl.POINTS)
-        points.release()
+            vertices.render(moderngl.POINTS)
+        vertices.release()
         buffer.release()
 
     def _add(self, plan: Pyramid, level: int, veil: moderngl.Texture) -> moderngl.Texture:

@@ -46,6 +46,7 @@ from hdrusd.gpu.release import release
 from hdrusd.gpu.shadows import ShadowMaps
 from hdrusd.gpu.sky import SkyPass
 from hdrusd.gpu.sky_occlusion import SkyOcclusion
+from hdrusd.gpu.small_lamps import SmallLamps
 from hdrusd.gpu.supersampling import Accumulator, offsets, shifted
 from hdrusd.gpu.surfaces import SurfacePass, set_used
 from hdrusd.gpu.textures import TextureCache
@@ -138,6 +139,7 @@ class HdrRenderer:
         self._distances = ctx.framebuffer([self._layers["g_normal"]])
         self._peeling: Peeling | None = None
         self._told_merged = False
+        self._small = SmallLamps(ctx, size)
         self._samples = tuple(offsets(options.samples))
         self._sum = Accumulator(ctx, programs, size) if options.samples > 1 else None
 
@@ -150,14 +152,18 @@ class HdrRenderer:
         """Draw one moment; returns ``hdr``."""
         scene = self.skies.with_suns(scene)
         extras = self._extras(scene)
+        self._small.begin(scene)
         if self._sum is None:
             self._draw(scene, extras)
+            self._look(scene, 1.0)
             self._tell_merged()
             return self.hdr
         self._sum.clear()
         for offset in self._samples:
             camera = shifted(scene.camera, offset, self.size)
-            self._draw(replace(scene, camera=camera), extras)
+            sample = replace(scene, camera=camera)
+            self._draw(sample, extras)
+            self._look(sample, 1.0 / len(self._samples))
             self._sum.add(self._layers["hdr"], 1.0 / len(self._samples))
         self._tell_merged()
         return self.hdr
@@ -169,7 +175,7 @@ class HdrRenderer:
         release(self._occlusion, self._casters, self._shadows, self._profiles, self._peeling)
         release(self.surfaces, self.lights, self.skies, self._sum, self._textures)
         release(self._gbuffer, self._frame, self._distances)
-        release(self._layers, self._scattered, self._depth)
+        release(self._layers, self._scattered, self._depth, self._small)
 
     @property
     def light_error(self) -> float:
@@ -186,6 +192,13 @@ class HdrRenderer:
         frame = self._frame if self._sum is None else self._sum.frame
         pixels = np.frombuffer(frame.read(components=3, dtype="f4"), np.float32)
         return np.ascontiguousarray(pixels.reshape(h, w, 3)[::-1])
+
+    def small_lamps(self, frame: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
+        """Of the last ``frame``, as ``read``: lamps that its pixels cannot show, (n, 6).
+
+        Rows of glare/veil.py; gpu/small_lamps.py says which.
+        """
+        return self._small.rows(frame)
 
     def layer(self, name: str) -> npt.NDArray[np.float32]:
         """A layer of the G-buffer (``LAYERS``; gbuffer.frag) as (h, w, 4), top row first.
@@ -222,6 +235,10 @@ class HdrRenderer:
         self.lights.add(scene, layers, self._frame, extras, self._bind)
         self.skies.draw_background(scene, self._frame, self.size)
         self._add_blended(scene, extras, extra)
+
+    def _look(self, scene: RenderScene, share: float) -> None:
+        hdr, normal, diffuse = (self._layers[name] for name in ("hdr", "g_normal", "g_diffuse"))
+        self._small.look(scene.camera, hdr, normal, diffuse, share)
 
     def draw_surfaces(self, scene: RenderScene) -> None:
         """Step one: G-buffer, and emission plus ambient in the frame."""

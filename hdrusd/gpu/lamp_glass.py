@@ -6,6 +6,7 @@ drawn beside it and would hide it. What glows elsewhere, or is large, hides as a
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from hdrusd.scene import Draw, Geometry, RenderScene
 
 Doubles = npt.NDArray[np.float64]
 Booleans = npt.NDArray[np.bool_]
+Ints = npt.NDArray[np.int64]
 
 #: A glass comes as near to its lamp as so many of the lamp's radii, or so many m.
 _RADII, _NEAR = 3.0, 0.3
@@ -45,27 +47,42 @@ def lamp_glass(boxes: Doubles, lights: npt.NDArray[np.void]) -> Booleans:
     ``lights``: dtype LIGHT; distant ones have no glass.
     """
     found = np.zeros(len(boxes), np.bool_)
-    lamps = lights[lights["w"] > 0.0]
     small = np.flatnonzero(2.0 * np.linalg.norm(boxes[:, 1], axis=1) < _LARGEST)
-    if not len(lamps) or not len(small):
-        return found
-    # Along one axis the lamps that may be near follow one another.
-    axis = int(np.argmax(np.ptp(lamps["position"], axis=0)))
-    lamps = lamps[np.argsort(lamps["position"][:, axis])]
-    places, reach = lamps["position"], np.maximum(_RADII * lamps["radius"], _NEAR)
-    middle, half = boxes[small, 0], boxes[small, 1]
+    lamps = lights[lights["w"] > 0.0]
+    for box, _ in near_pairs(boxes[small], lamps["position"], glass_reach(lamps)):
+        found[small[box]] = True
+    return found
+
+
+def glass_reach(lights: npt.NDArray[np.void]) -> Doubles:
+    """(n,) m: what glows no farther from a lamp than this is its glass."""
+    return np.asarray(np.maximum(_RADII * lights["radius"], _NEAR))
+
+
+def near_pairs(boxes: Doubles, places: Doubles, reach: Doubles) -> Iterator[tuple[Ints, Ints]]:
+    """Numbers of boxes (b, 2, 3) and of places (n, 3) that are within the ``reach`` (n,) of them.
+
+    In parts of some million comparisons each.
+    """
+    if not len(boxes) or not len(places):
+        return
+    # Along one axis the places that may be near follow one another.
+    axis = int(np.argmax(np.ptp(places, axis=0)))
+    order = np.argsort(places[:, axis])
+    places, reach = places[order], reach[order]
+    middle, half = boxes[:, 0], boxes[:, 1]
     wide = half[:, axis] + float(reach.max())
     first = np.searchsorted(places[:, axis], middle[:, axis] - wide)
     count = np.searchsorted(places[:, axis], middle[:, axis] + wide, "right") - first
-    step = max(_PAIRS // len(lamps), 1)
-    for start in range(0, len(small), step):
+    step = max(_PAIRS // len(places), 1)
+    for start in range(0, len(boxes), step):
         some = slice(start, start + step)
-        box = np.repeat(np.arange(len(small))[some], count[some])
+        box = np.repeat(np.arange(len(boxes))[some], count[some])
         before = np.repeat(np.cumsum(count[some]) - count[some], count[some])
-        lamp = first[box] + np.arange(len(box)) - before
-        beyond = np.maximum(np.abs(places[lamp] - middle[box]) - half[box], 0.0)
-        found[small[box[np.linalg.norm(beyond, axis=1) <= reach[lamp]]]] = True
-    return found
+        place = first[box] + np.arange(len(box)) - before
+        beyond = np.maximum(np.abs(places[place] - middle[box]) - half[box], 0.0)
+        close = np.linalg.norm(beyond, axis=1) <= reach[place]
+        yield box[close], order[place[close]]
 
 
 class LampGlass:

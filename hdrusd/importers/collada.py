@@ -22,6 +22,7 @@ from hdrusd.importers.collada_geometry import GeometryReader
 from hdrusd.importers.collada_lights import LightReader
 from hdrusd.importers.collada_materials import MaterialReader
 from hdrusd.importers.collada_nodes import NodeReader
+from hdrusd.importers.collada_skins import SkinReader
 from hdrusd.importers.collada_sources import Sources
 from hdrusd.importers.collada_textures import TextureReader
 from hdrusd.importers.collada_xml import Element, parse
@@ -73,6 +74,7 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
         LightReader(document),
         CameraReader(document),
         AnimationReader(document, sources),
+        SkinReader(document, sources),
     )
     scene = _visual_scene(document)
     roots = [] if scene is None else nodes.roots(scene)
@@ -90,6 +92,7 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
         materials=nodes.table,
         lights=nodes.lights.lights,
         cameras=nodes.cameras.cameras,
+        skins=nodes.bent,
         up="Z" if document.up == "Z_UP" else "Y",
         unit_m=document.unit_m,
         generator=document.generator,

@@ -47,6 +47,7 @@ class Prototype:
     names: tuple[str, ...]
     symbols: npt.NDArray[np.int32]
     sets: tuple[int, ...]
+    used: Longs  # (n,) the rows of the file's positions that the mesh's points are
 
 
 @dataclass(slots=True)
@@ -193,7 +194,7 @@ class GeometryReader:
             colors_interpolation="vertex" if colors is None else colors[1],
             two_sided=_two_sided(document, geometry),
         )
-        return Prototype(mesh, names, symbols, tuple(kept))
+        return Prototype(mesh, names, symbols, tuple(kept), used)
 
     def _good_faces(
         self, place: Element, name: str, faces: Faces, points: Doubles, offset: int

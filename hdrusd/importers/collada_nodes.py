@@ -1,8 +1,7 @@
-"""The node tree of COLLADA: instances expanded, meshes shared, no recursion.
+"""The node tree of COLLADA: instances shared, no recursion.
 
 COLLADA 1.4.1, chapter 5: ``node`` and the ``instance_*`` elements. A node that is instanced 300
-times stands 300 times in the tree, as each may be a lamp with its own place, and its meshes once
-in the table.
+times is one node below 300 others.
 """
 
 from __future__ import annotations
@@ -19,9 +18,11 @@ from hdrusd.importers.collada_document import Document, Doubles, extras, named
 from hdrusd.importers.collada_geometry import GeometryReader, Prototype
 from hdrusd.importers.collada_lights import LightReader
 from hdrusd.importers.collada_materials import MaterialReader, scalars
+from hdrusd.importers.collada_skins import Bound, SkinReader, first_parents
 from hdrusd.importers.collada_transforms import WIDTHS, matrices, static_matrix
 from hdrusd.importers.collada_xml import Element
-from hdrusd.legacy.scene import Material, Mesh, Node, Subset
+from hdrusd.importers.expansion import check_expansion
+from hdrusd.legacy.scene import Material, Mesh, Node, Skin, Subset
 from hdrusd.report import Kind
 
 _INSTANCES = ("instance_camera", "instance_controller", "instance_geometry", "instance_light")
@@ -29,6 +30,17 @@ _READ = frozenset((*WIDTHS, *_INSTANCES, "instance_node", "node", "extra", "asse
 _CHANNEL = re.compile(r"\D*(\d{1,4})")
 #: A controller may name a controller: a skin over a morph.
 _CONTROLLERS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class _Skinned:
+    """A node whose joints are still to be found."""
+
+    node: Node
+    meshes: list[int]
+    bound: Bound
+    instance: Element
+    shape: Doubles | None
 
 
 @dataclass(slots=True)
@@ -41,10 +53,14 @@ class NodeReader:
     lights: LightReader
     cameras: CameraReader
     animations: AnimationReader
+    skins: SkinReader
     meshes: list[Mesh] = field(default_factory=list)
     table: list[Material] = field(default_factory=list)
-    _mesh_numbers: dict[tuple[int, tuple[int | None, ...]], int] = field(default_factory=dict)
+    bent: list[Skin] = field(default_factory=list)
+    _mesh_numbers: dict[tuple[int, int, tuple[int | None, ...]], int] = field(default_factory=dict)
     _material_numbers: dict[tuple[int, tuple[str, ...]], int] = field(default_factory=dict)
+    _made: dict[int, Node] = field(default_factory=dict)  # by the id of the element
+    _waiting: list[_Skinned] = field(default_factory=list)
 
     def roots(self, scene: Element) -> list[Node]:
         """The trees of a visual scene.
@@ -52,27 +68,20 @@ class NodeReader:
         Raises InputError where nodes instance themselves, or lie too deep, or are too many.
         """
         top = Node("", self.document.ref(scene))
-        limits = self.document.limits
-        # An instance is open while what is below it is made: (element, parent, ids above, depth)
-        pending = [(child, top, frozenset[int](), 1) for child in self._below(scene)]
-        pending.reverse()
-        made = 0
+        pending = [(child, top) for child in reversed(self._below(scene))]
         while pending:
-            element, parent, above, depth = pending.pop()
-            if id(element) in above:
-                problem = f"node {named(element, 'node')!r} contains itself; want a tree"
-                raise self.document.error(element, problem)
-            if depth > limits.depth:
-                raise self.document.error(element, f"nested deeper than {limits.depth} nodes")
-            made += 1
-            if made > limits.nodes:
-                raise self.document.error(element, f"more than {limits.nodes} nodes up to here")
-            node = self._node(element)
+            element, parent = pending.pop()
+            known = self._made.get(id(element))
+            if known is not None:
+                parent.children.append(known)
+                continue
+            node = self._made[id(element)] = self._node(element)
             parent.children.append(node)
-            inside = above | {id(element)}
-            pending += [
-                (child, node, inside, depth + 1) for child in reversed(self._below(element))
-            ]
+            pending += [(child, node) for child in reversed(self._below(element))]
+        check_expansion(top.children, self.document.limits)
+        above = first_parents(top.children) if self._waiting else {}
+        for waiting in self._waiting:
+            self._finish(waiting, above)
         return top.children
 
     def _below(self, element: Element) -> list[Element]:
@@ -136,25 +145,44 @@ class NodeReader:
         document = self.document
         found = document.resolve(instance, "url", "controller")
         shape: Doubles | None = None
+        bound: Bound | None = None
         for _ in range(_CONTROLLERS):
             kind = None if found is None else found.child("skin", "morph")
             if kind is None:
                 break
-            what = "skins dropped; meshes stay in their bind pose"
             if kind.tag == "morph":
                 what = "morph targets dropped; the base mesh is kept"
-            document.note(Kind.DROPPED, "skin", document.root, "", what)
+                document.note(Kind.DROPPED, "morph", document.root, "", what)
             bind = kind.child("bind_shape_matrix")
             if bind is not None and shape is None:
                 values = document.vector(bind, 16)
                 shape = None if values is None else matrices("matrix", values[None])[0]
+            if kind.tag == "skin" and bound is None:
+                bound = self.skins.read(kind, shape)
             found = document.resolve(kind, "source", "geometry", "controller")
             if found is not None and found.tag == "geometry":
-                meshes = self._worn(found, instance, node.name)
-                self._place(node, meshes, shape)
+                meshes = self._worn(found, instance, node.name, bound)
+                if bound is None:
+                    self._place(node, meshes, shape)
+                else:
+                    self._waiting.append(_Skinned(node, meshes, bound, instance, shape))
                 return
         text = "controller without a mesh; dropped"
         document.note(Kind.MISSING, "collada-controller", instance, named(element, ""), text)
+
+    def _finish(self, waiting: _Skinned, above: dict[int, Node]) -> None:
+        """Give a node its skin, now that all joints are made."""
+        node, meshes = waiting.node, waiting.meshes
+        skin = self.skins.finish(waiting.bound, waiting.instance, self._made, node, above)
+        if skin is None:
+            self._place(node, meshes, waiting.shape)
+            return
+        if node.skin is not None:
+            node.children.append(Node(f"{node.name}_skin", node.source))
+            node = node.children[-1]
+        node.skin = len(self.bent)
+        node.meshes += meshes
+        self.bent.append(skin)
 
     def _place(self, node: Node, meshes: list[int], shape: Doubles | None) -> None:
         """Into the bind shape, unless the node stands there itself: exporters do either."""
@@ -169,25 +197,32 @@ class NodeReader:
 
     # -- materials of an instance ------------------------------------------------------------
 
-    def _worn(self, geometry: Element, instance: Element, thing: str) -> list[int]:
+    def _worn(
+        self, geometry: Element, instance: Element, thing: str, skin: Bound | None = None
+    ) -> list[int]:
         """The meshes of a geometry with the materials that an instance binds."""
         bound: dict[str, Element] = {}
         common = instance.path("bind_material", "technique_common")
         for item in () if common is None else common.all("instance_material"):
             bound.setdefault(item.get("symbol"), item)
         return [
-            self._mesh(prototype, bound, instance, thing)
+            self._mesh(prototype, bound, instance, thing, skin)
             for prototype in self.geometries.read(geometry)
         ]
 
     def _mesh(
-        self, prototype: Prototype, bound: dict[str, Element], instance: Element, thing: str
+        self,
+        prototype: Prototype,
+        bound: dict[str, Element],
+        instance: Element,
+        thing: str,
+        skin: Bound | None,
     ) -> int:
         materials = tuple(
             self._material(symbol, bound.get(symbol), prototype, instance, thing)
             for symbol in prototype.names
         )
-        key = id(prototype), materials
+        key = id(prototype), id(skin), materials
         if key in self._mesh_numbers:
             return self._mesh_numbers[key]
         self._mesh_numbers[key] = len(self.meshes)
@@ -204,7 +239,7 @@ class NodeReader:
                 for number in sorted(set(worn))
             )
             mesh = replace(mesh, subsets=subsets, two_sided=both)
-        self.meshes.append(mesh)
+        self.meshes.append(mesh if skin is None else _held(mesh, prototype, skin))
         return self._mesh_numbers[key]
 
     def _material(
@@ -274,6 +309,18 @@ class NodeReader:
                 text = f"coordinates {channel[:40]!r} are not bound; {made[channel]} is used"
                 self.document.note(Kind.ASSUMED, "collada-texcoord", instance, thing, text)
         return made
+
+
+def _held(mesh: Mesh, prototype: Prototype, skin: Bound) -> Mesh:
+    """A mesh with the influences of its points; those past the skin's are on joint 0."""
+    indices, weights = skin.held.indices, skin.held.weights
+    used = prototype.used
+    held = used < len(indices)
+    own = np.zeros((len(used), indices.shape[1]), np.int32)
+    share = np.zeros(own.shape, np.float32)
+    share[:, 0] = 1.0
+    own[held], share[held] = indices[used[held]], weights[used[held]]
+    return replace(mesh, joint_indices=own, joint_weights=share)
 
 
 def _vertex_inputs(item: Element) -> dict[str, int]:

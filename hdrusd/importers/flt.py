@@ -14,13 +14,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from hdrusd.errors import InputError, SourceRef
+from hdrusd.importers.expansion import check_expansion
 from hdrusd.importers.flt_materials import MaterialReader
 from hdrusd.importers.flt_palettes import Palettes, read_palettes
 from hdrusd.importers.flt_records import Document, load
 from hdrusd.importers.flt_textures import TextureReader, resolver_of
 from hdrusd.importers.flt_tree import Reference, Tree, TreeReader
 from hdrusd.importers.importer import Resolver
-from hdrusd.legacy.scene import LegacyScene, Node
+from hdrusd.legacy.scene import LegacyScene
 from hdrusd.report import Kind, Report
 
 #: All palettes of its own: the flags of a reference before revision 14.2, and of 15.4.1,
@@ -74,7 +75,7 @@ class _SceneReader:
         self.scene.roots.append(tree.root)
         while self.waiting:
             self._follow(self.waiting.popleft())
-        self._check_size()
+        check_expansion(self.scene.roots, self.resolver.limits)
         return self.scene
 
     def _tree(self, document: Document, palettes: Palettes) -> Tree:
@@ -153,25 +154,3 @@ class _SceneReader:
             seen |= new
             stack += new
         return False
-
-    def _check_size(self) -> None:
-        """Shared nodes stand once in memory and many times in a stage: count those."""
-        limits = self.resolver.limits
-        sizes: dict[int, tuple[int, int]] = {}  # nodes and levels below and with a node
-        stack: list[tuple[Node, bool]] = [(root, False) for root in self.scene.roots]
-        while stack:
-            node, done = stack.pop()
-            if id(node) in sizes:
-                continue
-            if not done:
-                stack.append((node, True))
-                stack += [(child, False) for child in node.children]
-                continue
-            below = [sizes[id(child)] for child in node.children]
-            size = 1 + sum(count for count, _ in below), 1 + max((d for _, d in below), default=0)
-            if size[0] > limits.nodes:
-                raise InputError(node.source, f"more than {limits.nodes} nodes with its instances")
-            if size[1] > limits.depth:
-                text = f"nested deeper than {limits.depth} with its instances"
-                raise InputError(node.source, text)
-            sizes[id(node)] = size

@@ -48,6 +48,7 @@ class NodeMesh:
 
     owner: int  # record of the node
     hidden: bool
+    apart: int  # number of the switch's child that it is; 0 for a mesh of its node
     mesh: Mesh
     offset: tuple[float, float, float] | None  # of its origin, where its points are far out
 
@@ -82,11 +83,13 @@ class GeometryReader:
         polygons: Polygons,
         owner: Integers,
         hidden: Flags,
+        apart: Integers,
         transparency: Integers,
     ) -> list[NodeMesh]:
         """The meshes, in the order of the file.
 
         ``owner``: the record of the node that has each face; ``hidden``: faces never shown;
+        ``apart``: the number of faces that a switch shows together, 0 for others;
         ``transparency``: of the objects about them, 0 to 255.
         """
         usable = self._usable(faces, polygons)
@@ -104,8 +107,10 @@ class GeometryReader:
         # Owners in the order of the file, then the kind of face: one number for both.
         kind = hidden * 8 + (faces.draw == CULLED) * 4 + colored * 2 + (subface > 0)
         _, group = np.unique(owner * 16 + kind, return_inverse=True)
+        parts = int(apart.max(initial=0)) + 1
+        _, group = np.unique(group.ravel() * parts + apart, return_inverse=True)
         made = self._sorted(polygons, usable, group.ravel().astype(np.int64), material, subface)
-        return self._meshes(made, faces, polygons, owner, hidden, gouraud, colored)
+        return self._meshes(made, faces, polygons, owner, hidden, apart, gouraud, colored)
 
     # -- which polygons there are ----------------------------------------------------------
 
@@ -216,6 +221,7 @@ class GeometryReader:
         polygons: Polygons,
         owner: Integers,
         hidden: Flags,
+        apart: Integers,
         gouraud: Flags,
         colored: Flags,
     ) -> list[NodeMesh]:
@@ -237,7 +243,8 @@ class GeometryReader:
             mesh = replace(mesh, two_sided=bool(faces.draw[face] != CULLED))
             if colored[face]:
                 mesh = self._with_colors(mesh, made, faces, polygons, gouraud, some, corners, rows)
-            found.append((int(made.face[some].min()), record, bool(hidden[face]), mesh, offset))
+            flags = bool(hidden[face]), int(apart[face])
+            found.append((int(made.face[some].min()), record, *flags, mesh, offset))
         found.sort(key=lambda entry: entry[0])
         return [NodeMesh(*entry[1:]) for entry in found]
 

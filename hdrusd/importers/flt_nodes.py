@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from hdrusd.importers.flt_records import (
     COMMENT,
@@ -19,6 +20,7 @@ from hdrusd.importers.flt_records import (
     FACE,
     GROUP,
     HEADER,
+    INDEXED_STRING,
     INSTANCE,
     LOD,
     LONG_ID,
@@ -37,7 +39,7 @@ from hdrusd.report import Kind
 #: palette's vertices.
 _READ = frozenset(
     {10, 11, 19, 20, 21, 22, 122, 123, 5, 51, 60, 63, 66, 67, 68, 69, 70, 71, 72, 74, 89}
-    | {31, 32, 33, 64, 84, 85, 86, 102, 105, 106, 107, 108, 109, 110, 111, 113, 119, 128, 129}
+    | {31, 32, 33, 64, 84, 85, 86, 102, 105, 106, 107, 108, 109, 110, 111, 113, 119, 128, 129, 132}
     | {*TRANSFORMS, *NODES}
 )
 #: Records without a home, by name.
@@ -57,7 +59,6 @@ _DROPPED = {
     112: "texture mappings",
     114: "names of colours",
     116: "data of a continuously adaptive terrain",
-    132: "indexed strings",
     133: "shaders",
 }
 #: Nodes without a meaning here; their children are kept.
@@ -82,7 +83,10 @@ _NOT_ILLUMINATED = 0x10000000
 _ALWAYS = (0.0, float(np.finfo(np.float32).max))
 
 _COMMENTED = 4096  # characters of a comment that are kept
+Flags = npt.NDArray[np.bool_]
+
 _WORDS = 1024  # words of a switch mask that are read: 32,768 children
+_BITS = 1 << 16  # of all masks of a switch that are kept beside the current one
 
 
 @dataclass(slots=True)
@@ -100,6 +104,15 @@ class Description:
     extras: dict[str, Any] = field(default_factory=dict)
 
 
+@dataclass(slots=True)
+class Masks:
+    """What a switch shows of its children: (n,) by the current mask, and by each, with names."""
+
+    current: Flags
+    every: list[Flags] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+
+
 class NodeReader:
     """Describes the nodes of one file."""
 
@@ -110,6 +123,7 @@ class NodeReader:
         self._comments: dict[int, list[int]] = {}
         self._transforms: dict[int, list[int]] = {}
         self._copies: dict[int, int] = {}
+        self._mask_names: dict[int, dict[int, str]] = {}  # of each switch, by number
         self._ancillaries()
         moved = {r for r in (*self._transforms, *self._copies) if records.op[r] in (FACE, MESH)}
         self.moved_faces = np.array(sorted(moved), np.int64)
@@ -121,7 +135,7 @@ class NodeReader:
     def _ancillaries(self) -> None:
         """What belongs to which node; of faces only where they stand."""
         document, records = self.document, self.document.records
-        wanted = records.of(COMMENT, LONG_ID, REPLICATE, *TRANSFORMS)
+        wanted = records.of(COMMENT, LONG_ID, REPLICATE, INDEXED_STRING, *TRANSFORMS)
         holder = records.before(records.of(FACE, *NODES), wanted)
         holder = np.where(holder >= 0, holder, records.parent[wanted])
         holder = np.maximum(holder, 0)  # before any node: the header's
@@ -139,6 +153,9 @@ class NodeReader:
                 self._comments.setdefault(owner, []).append(record)
             elif code == LONG_ID:
                 self._long[owner] = record
+            elif code == INDEXED_STRING:
+                (number,) = document.integers(record, 4, "I")
+                self._mask_names.setdefault(owner, {})[number] = document.text(record, 8)
             elif code == REPLICATE:
                 self._copies[owner] = max(document.integers(record, 4, "h")[0], 0)
             else:
@@ -212,7 +229,7 @@ class NodeReader:
         old = self.document.version < 1580  # the swing bit alone moved it, and never backwards
         if flags & (_FORWARD | (_SWING if old else _BACKWARD)):
             made.kind = "sequence"
-            text = "children are shown one after the other; the first is shown"
+            text = "children are shown one after the other; the first is selected"
             self.document.add(Kind.REPLACED, "flt-sequence", made.record, made.name, text)
 
     def _object(self, made: Description) -> None:
@@ -238,8 +255,8 @@ class NodeReader:
         made.lod = (near, far), center
         made.extras["range"] = near, far
 
-    def switched_on(self, record: int, children: int) -> list[bool]:
-        """Which children of a switch the current mask has; bit 0 is the first."""
+    def masks(self, record: int, children: int) -> Masks:
+        """Which children of a switch each mask has; bit 0 is the first."""
         document, name = self.document, self.name(record)
         current, masks, words = document.integers(record, 16, "3I")
         read = min(words, _WORDS, math.ceil(children / 32))
@@ -248,14 +265,19 @@ class NodeReader:
         if current >= masks or at + 4 * read > len(body):
             text = f"mask {current} of {masks} with {words} words is not there; all is on"
             document.add(Kind.INVALID, "flt-switch", record, name, text)
-            return [True] * children
-        if masks > 1:
-            text = f"{masks} masks; the current one, {current}, is kept"
+            return Masks(np.ones(children, np.bool_))
+        found = Masks(_bits(body, at, read, children))
+        there = min(masks, (len(body) - 28) // (4 * words)) if words else 0
+        if masks > 1 and there * children <= _BITS:
+            found.every = [
+                _bits(body, 28 + 4 * number * words, read, children) for number in range(there)
+            ]
+            given = self._mask_names.get(record, {})
+            found.names = [given.get(number) or f"mask{number}" for number in range(there)]
+        elif masks > 1:
+            text = f"{masks} masks of {children} children; the current one, {current}, is kept"
             document.add(Kind.DROPPED, "flt-switch-masks", record, name, text)
-        bits = np.frombuffer(body[at : at + 4 * read], ">u4")
-        on = (bits[:, None] >> np.arange(32, dtype=np.uint32)) & 1
-        shown = [bool(bit) for bit in on.ravel().tolist()][:children]
-        return shown + [False] * (children - len(shown))
+        return found
 
     def object_flags(self, records: Integers) -> tuple[Integers, Integers]:
         """Of some records the transparency (0 to 255) and whether not illuminated; 0 of others."""
@@ -266,3 +288,10 @@ class NodeReader:
                 flags, _, clear = self.document.integers(record, 12, "IhH")
                 found[:, number] = (clear * 255 + 32767) // 65535, bool(flags & _NOT_ILLUMINATED)
         return found[0][row], found[1][row]
+
+
+def _bits(body: bytes, at: int, words: int, count: int) -> Flags:
+    """(count,) bits of a mask, the lowest of the first word first; off past its end."""
+    bits = np.frombuffer(body[at : at + 4 * words], ">u4")
+    on = ((bits[:, None] >> np.arange(32, dtype=np.uint32)) & 1).astype(np.bool_).ravel()[:count]
+    return np.concatenate([on, np.zeros(count - len(on), np.bool_)])

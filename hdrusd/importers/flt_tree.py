@@ -17,7 +17,7 @@ from hdrusd.importers.flt_geometry import GeometryReader
 from hdrusd.importers.flt_light_points import LightPointReader
 from hdrusd.importers.flt_lights import read_light
 from hdrusd.importers.flt_materials import MaterialReader
-from hdrusd.importers.flt_nodes import Description, NodeReader
+from hdrusd.importers.flt_nodes import Description, Flags, NodeReader
 from hdrusd.importers.flt_palettes import Palettes
 from hdrusd.importers.flt_records import (
     DEFINITION,
@@ -34,7 +34,7 @@ from hdrusd.importers.flt_records import (
     Integers,
 )
 from hdrusd.importers.flt_transforms import Doubles
-from hdrusd.legacy.scene import TRS, LegacyScene, Node
+from hdrusd.legacy.scene import TRS, LegacyScene, Light, Mesh, Node
 from hdrusd.report import Kind
 
 
@@ -62,6 +62,25 @@ class Tree:
                 self.named[name] = scaled
             else:
                 self.root = scaled
+
+
+@dataclass(slots=True)
+class _Switched:
+    """Faces of a switch that the same masks show."""
+
+    switch: Node
+    shown: tuple[bool, ...]  # by the current mask, then by each
+
+    def child(self, mesh: Mesh) -> Node:
+        """One more child of the switch, for a mesh of these faces."""
+        node = Node(mesh.name, mesh.source)
+        self.switch.children.append(node)
+        self.switch.switch_on += (self.shown[0],)
+        self.switch.switch_masks = tuple(
+            (name, (*mask, on))
+            for (name, mask), on in zip(self.switch.switch_masks, self.shown[1:], strict=True)
+        )
+        return node
 
 
 class TreeReader:
@@ -129,11 +148,12 @@ class TreeReader:
         document, record = self.document, found.record
         above = self._inside.get(parent, tree.root)
         node = self._counted(Node(found.name, document.ref(record), visible=found.visible))
-        node.kind, node.extras = found.kind, found.extras
+        node.extras = found.extras
         if found.copies and found.transform is not None:
             inner = self._replicated(node, found, found.transform)
         else:
             node.transform, inner = found.transform, node
+        inner.kind = found.kind
         self._inside[record] = inner
         tree.named.setdefault(found.name, node)
         if found.op == DEFINITION:
@@ -150,10 +170,13 @@ class TreeReader:
         elif found.op == LIGHT_SOURCE:
             light = read_light(document, self.palettes, record, found.name)
             if light is not None:
-                inner.lights.append(len(self.scene.lights))
-                self.scene.lights.append(light)
+                self._shine(inner, [light])
         elif found.op in (LIGHT_POINT, INDEXED_LIGHT_POINT):
-            inner.extras = {**inner.extras, **self.points.read(record, found.name)}
+            self._shine(inner, self.points.read(record, found.name))
+
+    def _shine(self, node: Node, lights: list[Light]) -> None:
+        node.lights += range(len(self.scene.lights), len(self.scene.lights) + len(lights))
+        self.scene.lights += lights
 
     def _replicated(self, node: Node, found: Description, step: Doubles) -> Node:
         """Fill ``node`` with copies of an inner one, each moved from the one before."""
@@ -197,12 +220,13 @@ class TreeReader:
         owner = np.where(own, faces.record, self._node_above(faces.record))
         transparency, dark = self.nodes.object_flags(owner)
         faces.lit &= dark == 0
-        hidden = self._switches(parents, faces.record[~own])
+        apart, switched = self._switches(parents, faces.record, ~own)
         meshes = GeometryReader(document, self.palettes, self.materials).read(
             faces,
             polygons,
             owner,
-            faces.hidden | np.isin(faces.record, list(hidden)),
+            faces.hidden,
+            apart,
             transparency,
         )
         far = [found for found in meshes if found.offset is not None]
@@ -212,6 +236,8 @@ class TreeReader:
             report.add(Kind.REPLACED, "flt-far-points", mesh.source, mesh.name, text)
         for found in meshes:
             node = self._inside[found.owner]
+            if found.apart:
+                node = self._counted(switched[found.apart - 1].child(found.mesh))
             if found.hidden or found.offset is not None:
                 place = None if found.offset is None else TRS(found.offset)
                 source = found.mesh.source
@@ -220,29 +246,42 @@ class TreeReader:
                 node = holder
             node.meshes.append(len(self.scene.meshes))
             self.scene.meshes.append(found.mesh)
-        for record, notes in self.points.of_faces(faces, polygons, owner).items():
-            node = self._inside[record]
-            node.extras = {**node.extras, **notes}
+        for record, lights in self.points.of_faces(faces, polygons, owner).items():
+            self._shine(self._inside[record], lights)
 
-    def _switches(self, parents: Integers, faces: Integers) -> set[int]:
-        """Set what each switch shows of its nodes; the faces that it does not show.
+    def _switches(
+        self, parents: Integers, faces: Integers, flat: Flags
+    ) -> tuple[Integers, list[_Switched]]:
+        """Set what each switch shows of its nodes; its faces, numbered by what shows them.
 
-        Bits count nodes and faces alike, as they follow one another.
+        Bits count nodes and faces alike, as they follow one another. ``flat``: faces that are
+        no nodes. Returns (faces,) numbers from 1, 0 for faces below no switch, and what they are.
         """
         records = self.nodes.records
         op = self.document.records.op
         child = op[records] != DEFINITION
         nodes = Grouped(parents[child], records[child])
-        own_faces = Grouped(self.document.records.parent[faces], faces)
-        hidden: set[int] = set()
+        rows = np.flatnonzero(flat)
+        own_faces = Grouped(self.document.records.parent[faces[rows]], rows)
+        apart = np.zeros(len(faces), np.int64)
+        found: list[_Switched] = []
         for switch in records[op[records] == SWITCH].tolist():
-            below, flat = nodes[switch], own_faces[switch]
-            order = np.argsort(np.concatenate([below, flat]), kind="stable")
-            shown = np.ones(len(order), np.bool_)
-            shown[order] = self.nodes.switched_on(switch, len(order))
-            self._inside[switch].switch_on = tuple(shown[: len(below)].tolist())
-            hidden.update(flat[~shown[len(below) :]].tolist())
-        return hidden
+            below, own = nodes[switch], own_faces[switch]
+            order = np.argsort(np.concatenate([below, faces[own]]), kind="stable")
+            masks = self.nodes.masks(switch, len(order))
+            shown = np.ones((1 + len(masks.every), len(order)), np.bool_)
+            shown[:, order] = [masks.current, *masks.every]
+            node = self._inside[switch]
+            node.switch_on = tuple(shown[0, : len(below)].tolist())
+            node.switch_masks = tuple(
+                (name, tuple(row[: len(below)].tolist()))
+                for name, row in zip(masks.names, shown[1:], strict=True)
+            )
+            if len(own):
+                alike, which = np.unique(shown[:, len(below) :].T, axis=0, return_inverse=True)
+                apart[own] = len(found) + 1 + which.ravel()
+                found += [_Switched(node, tuple(bits.tolist())) for bits in alike]
+        return apart, found
 
     def _group_lods(self) -> None:
         """Levels of detail of one parent and one centre become children of a node."""

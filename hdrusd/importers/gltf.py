@@ -11,6 +11,7 @@ from hdrusd.importers.gltf_lights import EXTENSION, read_lights
 from hdrusd.importers.gltf_materials import default_material, read_materials
 from hdrusd.importers.gltf_meshes import MeshReader
 from hdrusd.importers.gltf_nodes import NodeReader
+from hdrusd.importers.gltf_skins import SkinReader
 from hdrusd.importers.importer import Resolver
 from hdrusd.legacy.scene import LegacyScene
 from hdrusd.report import Kind, Report
@@ -44,19 +45,22 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
     accessors = Accessors(document, resolver)
     materials = read_materials(document, Textures(document, accessors, resolver))
     lights, light_numbers = read_lights(document)
-    meshes = MeshReader(document, accessors, materials)
+    skins = SkinReader(document, accessors)
+    meshes = MeshReader(document, accessors, materials, skins)
     if any(mesh.material == meshes.default_material for mesh in meshes.meshes):
         materials.append(default_material(document))
     animations = read_animations(document, accessors)
     nodes = NodeReader(document, meshes.by_mesh, light_numbers, animations)
+    roots = nodes.roots()
     scene = LegacyScene(
         source=resolver.source,
         format="gltf",
-        roots=nodes.roots(),
+        roots=roots,
         meshes=meshes.meshes,
         materials=materials,
         lights=lights,
         cameras=read_cameras(document),
+        skins=skins.finish(nodes.made, meshes.by_mesh),
         generator=document.root.child("asset").text("generator"),
     )
     if not (scene.meshes or scene.lights or scene.cameras):

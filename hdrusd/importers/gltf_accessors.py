@@ -22,7 +22,7 @@ from hdrusd.legacy.scene import Floats
 from hdrusd.report import Kind
 
 _DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 #: A sparse accessor may start from zeros that no byte of the file backs; more is refused.
 _ZERO_BASE_BYTES = 64 << 20
@@ -125,7 +125,7 @@ class Accessors:
         dtype = _DTYPES.get(item.integer("componentType") or 0)
         count = item.integer("count")
         if width is None or dtype is None or not count:
-            raise item.error("want SCALAR or VEC2 to VEC4, a known componentType and a count")
+            raise item.error("want SCALAR, VEC2 to VEC4 or MAT4, a known componentType, a count")
         if "bufferView" in item:
             values = self._strided(item, count, width, np.dtype(dtype))
         elif "sparse" not in item:

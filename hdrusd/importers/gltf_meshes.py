@@ -18,12 +18,15 @@ from hdrusd.errors import InputError
 from hdrusd.importers.gltf_accessors import Accessors
 from hdrusd.importers.gltf_document import Document, Item, one_line
 from hdrusd.importers.gltf_images import uv_set_name
+from hdrusd.importers.gltf_skins import SETS, SkinReader
 from hdrusd.legacy.scene import Floats, Interpolation, Ints, Material, Mesh
 from hdrusd.report import Kind
 
 _TRIANGLES, _STRIP, _FAN = range(4, 7)
 _OTHER_MODES = {0: "points", 1: "lines", 2: "a line loop", 3: "a line strip"}
-_READ_ATTRIBUTES = {"POSITION", "NORMAL", "COLOR_0"}
+_READ_ATTRIBUTES = {"POSITION", "NORMAL", "COLOR_0"} | {
+    f"{what}_{number}" for what in ("JOINTS", "WEIGHTS") for number in range(SETS)
+}
 
 Corners = npt.NDArray[Any]  # (f, 3) whole numbers, dtype as the file has it
 
@@ -40,6 +43,7 @@ class _Vertices:
     normals: Floats | None
     uvs: dict[str, Floats]
     colors: Floats | None
+    joints: tuple[Ints, Floats] | None = None  # indices and weights
 
     def take(self, used: npt.NDArray[np.bool_]) -> _Vertices:
         """Only those vertices."""
@@ -48,6 +52,7 @@ class _Vertices:
             None if self.normals is None else self.normals[used],
             {name: uv[used] for name, uv in self.uvs.items()},
             None if self.colors is None else self.colors[used],
+            None if self.joints is None else (self.joints[0][used], self.joints[1][used]),
         )
 
 
@@ -59,8 +64,15 @@ class MeshReader:
     ``default_material``.
     """
 
-    def __init__(self, document: Document, accessors: Accessors, materials: list[Material]) -> None:
+    def __init__(
+        self,
+        document: Document,
+        accessors: Accessors,
+        materials: list[Material],
+        skins: SkinReader,
+    ) -> None:
         self._document = document
+        self._skins = skins
         self._accessors = accessors
         self._materials = materials
         self.default_material = len(materials)
@@ -71,12 +83,12 @@ class MeshReader:
         self._faces = 0
         self._lost: Counter[str] = Counter()
         for number, item in enumerate(document.table("meshes")):
-            self.by_mesh.append(self._mesh(item, item.name or f"mesh_{number}"))
+            self.by_mesh.append(self._mesh(item, number, item.name or f"mesh_{number}"))
         for key, count in sorted(self._lost.items()):
             text = f"{one_line(key)} of {count} meshes dropped: no home"
             document.root.note(Kind.DROPPED, "mesh-attribute", text)
 
-    def _mesh(self, item: Item, name: str) -> list[int]:
+    def _mesh(self, item: Item, mesh_number: int, name: str) -> list[int]:
         entries = []
         lost: set[str] = set()
         for number, primitive in enumerate(item.children("primitives")):
@@ -92,7 +104,8 @@ class MeshReader:
                 self.errors.append(primitive.error(text))
                 continue
             try:
-                mesh = self._primitive(primitive, attributes, mode, f"{name}_{number}")
+                label = f"{name}_{number}"
+                mesh = self._primitive(primitive, attributes, mode, mesh_number, label)
             except _LimitError:
                 raise
             except InputError as error:
@@ -104,11 +117,15 @@ class MeshReader:
         self._lost.update(lost)
         return entries
 
-    def _primitive(self, item: Item, attributes: Item, mode: int, name: str) -> Mesh:
+    def _primitive(
+        self, item: Item, attributes: Item, mode: int, mesh_number: int, name: str
+    ) -> Mesh:
         position = attributes.index("POSITION", "accessors")
         if position is None:
             raise item.error("primitive without a usable POSITION")
         vertices = self._vertices(item, attributes, position)
+        count = len(vertices.points)
+        vertices.joints = self._skins.influences(mesh_number, attributes, count, name)
         corners = self._corners(item, mode, len(vertices.points))
         corners = _good_faces(item, corners, vertices.points)
         vertices, indices = _used_only(vertices, corners)
@@ -133,6 +150,8 @@ class MeshReader:
             colors=vertices.colors,
             material=material,
             two_sided=two_sided,
+            joint_indices=None if vertices.joints is None else vertices.joints[0],
+            joint_weights=None if vertices.joints is None else vertices.joints[1],
         )
 
     def _check_budget(self, item: Item) -> None:

@@ -35,6 +35,7 @@ class NodeReader:
         self._by_mesh = by_mesh
         self._lights = lights
         self._animations = animations
+        self.made: dict[int, Node] = {}  # by number
 
     def roots(self) -> list[Node]:
         """The trees of the default scene. Raises InputError for what is no tree, or too deep."""
@@ -45,7 +46,7 @@ class NodeReader:
         children = [item.indices("children", "nodes") for item in items]
         parents = _parents(items, children)
         roots = self._scene_roots(items, parents)
-        made = {number: self._node(items[number], number) for number in roots}
+        made = self.made = {number: self._node(items[number], number) for number in roots}
         result = list(made.values())
         pending = [(number, 1) for number in roots]
         while pending:
@@ -91,9 +92,6 @@ class NodeReader:
             animation = ()
         mesh = item.index("mesh", "meshes")
         camera = item.index("camera", "cameras")
-        if "skin" in item:
-            root = self._document.root
-            root.note(Kind.DROPPED, "skin", "skins dropped; meshes stay in their bind pose")
         return Node(
             name=item.name or f"node_{number}",
             source=item.ref,

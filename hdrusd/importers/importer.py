@@ -23,6 +23,8 @@ class Limits:
     vertices: int = 100_000_000
     nodes: int = 1_000_000
     depth: int = 256
+    worker_bytes: int = 2 << 30  # address space of a third-party reader's process
+    worker_seconds: int = 120  # its wall time, and its processor time
 
 
 @dataclass(slots=True)
@@ -143,11 +145,14 @@ class Importer(Protocol):
 #: Name of the format to its reader.
 IMPORTERS: Registry[Importer] = Registry("importer", "hdrusd.importers")
 IMPORTERS.add("collada", "hdrusd.importers.collada:read")
+IMPORTERS.add("fbx", "hdrusd.importers.fbx:read")
 IMPORTERS.add("flt", "hdrusd.importers.flt:read")
 IMPORTERS.add("3ds", "hdrusd.importers.tds:read")
 IMPORTERS.add("gltf", "hdrusd.importers.gltf:read")
 IMPORTERS.add("obj", "hdrusd.importers.obj:read")
 IMPORTERS.add("osg", "hdrusd.importers.osg:read")
+IMPORTERS.add("assimp", "hdrusd.importers.assimp:read")
+IMPORTERS.add("osgconv", "hdrusd.importers.osgconv:read")
 
 #: File suffix (lower case) to the name of its format.
 SUFFIXES = {
@@ -155,12 +160,23 @@ SUFFIXES = {
     ".zae": "collada",
     ".kmz": "collada",
     ".3ds": "3ds",
+    ".fbx": "fbx",
     ".flt": "flt",
     ".gltf": "gltf",
     ".glb": "gltf",
     ".obj": "obj",
     ".osg": "osg",
     ".osgt": "osg",
+    ".osgb": "osgconv",
+    ".ive": "osgconv",
+    ".ac": "assimp",
+    ".b3d": "assimp",
+    ".lwo": "assimp",
+    ".ms3d": "assimp",
+    ".off": "assimp",
+    ".ply": "assimp",
+    ".stl": "assimp",
+    ".x": "assimp",
 }
 
 

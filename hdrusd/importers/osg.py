@@ -2,8 +2,8 @@
 
 The tree is walked with an explicit stack, since its depth is the file's choice:
 an object may be used in many places, and a reference may lead back to an
-ancestor. A shared Geometry is one mesh wherever it looks the same; nodes are
-repeated.
+ancestor. A shared node is one node, and a shared Geometry one mesh, wherever
+they look the same: below different states they do not.
 
 Sources: OpenSceneGraph 3.6, src/osgWrappers/serializers (.osgt),
 src/osgWrappers/deprecated-dotosg (.osg).
@@ -15,8 +15,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from hdrusd.errors import InputError, SourceRef
+from hdrusd.importers.expansion import check_expansion
 from hdrusd.importers.importer import Resolver
 from hdrusd.importers.osg_geometry import GeometryReader
+from hdrusd.importers.osg_light_points import LightPointReader
 from hdrusd.importers.osg_lights import LightReader
 from hdrusd.importers.osg_materials import Look, MaterialReader
 from hdrusd.importers.osg_nodes import DRAWABLES, NODES, Description, NodeReader
@@ -30,8 +32,12 @@ from hdrusd.report import Kind, Report
 
 def read(resolver: Resolver, report: Report) -> LegacyScene:
     """Read ``resolver.source``. Raises InputError when nothing can be used."""
-    source = resolver.source
-    document = parse(resolver.read(), source, report, resolver.limits)
+    return read_text(resolver.read(), resolver, report)
+
+
+def read_text(data: bytes, resolver: Resolver, report: Report) -> LegacyScene:
+    """Read text that stands for ``resolver.source``. Raises InputError."""
+    document = parse(data, resolver.source, report, resolver.limits)
     return _SceneReader(document, resolver).read()
 
 
@@ -44,7 +50,6 @@ class _Visit:
     state: RenderState
     ancestors: tuple[Any, ...]  # (id of the parent's statement, its ancestors), () at the root
     depth: int
-    shown: bool = True
 
 
 class _SceneReader:
@@ -63,9 +68,11 @@ class _SceneReader:
             document, TextureReader(document, resolver), self.scene.materials
         )
         self.lights = LightReader(document, self.scene.lights)
+        self.points = LightPointReader(document, self.scene.lights)
         self.stack: list[_Visit] = []
         self.count = 0  # nodes and drawables
         self.known = False  # whether any was of a known class
+        self._made: dict[tuple[int, int], Node] = {}  # by statement and inherited state
         self._shapes: dict[int, Mesh | None] = {}
         self._meshes: dict[tuple[int, Look], int] = {}
         self._cameras: dict[int, int] = {}
@@ -82,6 +89,7 @@ class _SceneReader:
         self.stack = [_Visit(place, self.scene.roots, root, (), 1) for place in reversed(roots)]
         while self.stack:
             self._visit(self.stack.pop())
+        check_expansion(self.scene.roots, self.limits)
         self.lights.finish()
         if not self.known:
             raise InputError(source, "no node of a known class; want OpenSceneGraph text")
@@ -93,6 +101,11 @@ class _SceneReader:
             missing = Node("missing", SourceRef(self.document.file), visible=False)
             visit.into.append(missing)
             return
+        # The same node in the same state looks the same wherever it stands.
+        key = id(place), id(visit.state)
+        if key in self._made:
+            visit.into.append(self._made[key])
+            return
         self._counted(place)
         if visit.depth > self.limits.depth:
             text = f"nodes deeper than {self.limits.depth}"
@@ -103,8 +116,9 @@ class _SceneReader:
             self.document.ref(place),
             found.placement.transform,
             animation=found.placement.animation,
-            visible=found.visible and visit.shown,
+            visible=found.visible,
         )
+        self._made[key] = node
         visit.into.append(node)
         if place.class_name in DRAWABLES:
             self._draw(node, place, visit.state)
@@ -113,16 +127,19 @@ class _SceneReader:
         self._light_model(state)
         inner = _unpivoted(node, found)
         inner.kind, inner.extras = found.kind, found.extras
-        inner.lod_ranges, inner.switch_on = found.lod_ranges, found.switch_on
+        inner.lod_ranges, inner.lod_on_screen = found.lod_ranges, found.lod_on_screen
+        inner.switch_on, inner.switch_masks = found.switch_on, found.switch_masks
         if place.class_name == "LightSource":
             light = self.lights.read(place, self.document.name(place), state)
             inner.lights += [] if light is None else [light]
+        elif place.class_name == "LightPointNode":
+            inner.lights += self.points.read(place, found.name)
         self._camera(inner, found)
         self._drawables(inner, found, state)
         ancestors = (id(place), visit.ancestors)
         self.stack.extend(
-            _Visit(child, inner.children, state, ancestors, visit.depth + 1, shown)
-            for child, shown in zip(reversed(found.children), reversed(found.shown), strict=True)
+            _Visit(child, inner.children, state, ancestors, visit.depth + 1)
+            for child in reversed(found.children)
         )
 
     def _counted(self, place: Statement) -> None:

@@ -1,4 +1,4 @@
-"""Lights and light points of an OpenSceneGraph file.
+"""Lights of an OpenSceneGraph file.
 
 What a file leaves out: .osg is written in full, so the values of osg::Light's
 constructor stand in. The writer of .osgt leaves out a value that equals its
@@ -8,7 +8,7 @@ OpenGL's default, so that is what is read; the fields are listed in
 so changes a light that it wrote itself.)
 
 Sources: OpenSceneGraph 3.6, src/osgWrappers/serializers/osg/Light.cpp, LightSource.cpp,
-src/osgWrappers/serializers/osgSim/LightPointNode.cpp, src/osg/Light.cpp.
+src/osg/Light.cpp.
 """
 
 from __future__ import annotations
@@ -150,54 +150,3 @@ class LightReader:
                 )
                 report = self.document.report
                 report.add(Kind.ASSUMED, "osg-light-number", second.source, second.name, text)
-
-
-def light_points(document: Document, node: Statement, name: str) -> dict[str, Any]:
-    """The light points of an osgSim::LightPointNode as extras of its node, and a finding."""
-    found = document.field(node, "lightpointlist")
-    holder = found if found is not None else node
-    points: list[dict[str, Any]] = []
-    for place in holder.block.statements if holder.block is not None else []:
-        if place.key != "lightpoint":
-            continue
-        on, intensity, radius = _attributes(document, place)
-        points.append(
-            {
-                "on": on,
-                "position": document.numbers(place, 3, "position") or (0.0, 0.0, 0.0),
-                "color": document.numbers(place, 4, "color") or (1.0, 1.0, 1.0, 1.0),
-                "intensity": intensity,
-                "radius": radius,
-            }
-        )
-    if not points:
-        return {}
-    colours = sorted({point["color"] for point in points})
-    shown = "; ".join(listed(colour) for colour in colours[:4])
-    more = f" and {len(colours) - 4} more" if len(colours) > 4 else ""
-    text = (
-        f"light points have no home yet: {len(points)} of colour {shown}{more}; "
-        "kept as notes of their node"
-    )
-    document.add(Kind.DROPPED, "osg-light-points", node, name, text)
-    return {"light_points": tuple(points)}
-
-
-def _attributes(document: Document, place: Statement) -> tuple[bool, float, float]:
-    """On, intensity, radius; ``Attributes TRUE 1 0.4 0.05`` in .osgt, 1 being a blend mode."""
-    found = document.field(place, "attributes")
-    if found is None:
-        on = document.word(place, "ison") != "FALSE"
-        intensity = document.number(place, 1.0, "intensity")
-        return on, intensity, document.number(place, 1.0, "radius")
-    values = [_finite(word, 1.0) for word in found.words[3:5]]
-    values += [1.0] * (2 - len(values))
-    return found.words[1:2] != ["FALSE"], values[0], values[1]
-
-
-def _finite(word: str, default: float) -> float:
-    try:
-        value = float(word)
-    except ValueError:
-        return default
-    return value if math.isfinite(value) else default

@@ -2,7 +2,7 @@
 
 Sources: OpenSceneGraph 3.6, src/osgWrappers/serializers/osg and osgSim (.osgt),
 src/osgWrappers/deprecated-dotosg/osg and osgSim (.osg): LOD, PagedLOD, Switch,
-Sequence, Billboard, ProxyNode, Node; osgSim's MultiSwitch, LightPointNode.
+Sequence, Billboard, ProxyNode, Node; osgSim's MultiSwitch.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from typing import Any, Literal
 import numpy as np
 
 from hdrusd.importers.osg_cameras import camera_view, render_camera
-from hdrusd.importers.osg_lights import light_points
 from hdrusd.importers.osg_text import Block, Document, Doubles, Statement
 from hdrusd.importers.osg_transforms import Placement, TransformReader
 from hdrusd.legacy.scene import Camera, Vec3
@@ -43,6 +42,7 @@ NODES = {
     *GEODES,
 }
 _CALLBACKS = ("eventcallback", "eventcallbacks", "cullcallback", "cullcallbacks")
+_SETS = 256  # of a MultiSwitch that are kept
 _ORIGIN: Vec3 = (0.0, 0.0, 0.0)
 _ALWAYS = (0.0, float(np.finfo(np.float32).max))  # osg::LOD takes FLT_MAX for "for ever"
 
@@ -59,9 +59,10 @@ class Description:
     placement: Placement
     kind: NodeKind = "group"
     children: list[Statement | None] = field(default_factory=list)  # None: refers to nothing
-    shown: list[bool] = field(default_factory=list)  # for each child
     lod_ranges: tuple[tuple[float, float], ...] = ()
+    lod_on_screen: bool = False
     switch_on: tuple[bool, ...] = ()
+    switch_masks: tuple[tuple[str, tuple[bool, ...]], ...] = ()
     drawables: list[tuple[Statement, Vec3]] = field(default_factory=list)  # and where they stand
     camera: Camera | None = None
     camera_matrix: Doubles | None = None
@@ -93,7 +94,6 @@ class NodeReader:
         if placement.faces_viewer:
             made.kind = "billboard"
         made.children = self._list(place, "children", "num_children")
-        made.shown = [True] * len(made.children)
         if kind in GEODES:
             self._geode(made)
         elif kind in ("LOD", "PagedLOD"):
@@ -104,8 +104,6 @@ class NodeReader:
             self._sequence(made)
         elif kind == "ProxyNode":
             self._files(made)
-        elif kind == "LightPointNode":
-            made.extras.update(light_points(document, place, name))
         elif kind == "CameraView":
             made.camera = camera_view(document, place, name)
         elif kind == "Camera":
@@ -210,7 +208,7 @@ class NodeReader:
             if pixels:  # many pixels are near
                 near, far = (1.0 / size if size > 1e-9 else 1e9 for size in (far, near))
             ranges[number] = near, far
-        made.kind, made.lod_ranges = "lod", tuple(ranges)
+        made.kind, made.lod_ranges, made.lod_on_screen = "lod", tuple(ranges), pixels
 
     def _switch(self, made: Description) -> None:
         """Values are TRUE and FALSE in .osgt, 1 and 0 in .osg; a MultiSwitch has sets of them."""
@@ -222,18 +220,21 @@ class NodeReader:
             inner = holder.block.statements if holder is not None and holder.block else []
             sets = [s for s in inner if s.key in ("switchset", "valuelist")]
             found = sets[active] if active < len(sets) else None
-            if len(sets) > 1:
-                text = f"{len(sets)} sets of switch values; the active one, {active}, is kept"
+            made.switch_masks = tuple(
+                (f"set{number}", tuple(_truths(values.block)[:count]))
+                for number, values in enumerate(sets[:_SETS])
+            )
+            if len(sets) > _SETS:
+                text = f"{len(sets)} sets of switch values; the first {_SETS} are kept"
                 self._add(Kind.DROPPED, "osg-switch-sets", made, text)
         values = _truths(None if found is None else found.block)[:count]
         default = document.word(place, "newchilddefaultvalue") not in ("FALSE", "0")
-        made.shown = values + [default] * (count - len(values))
-        made.kind, made.switch_on = "switch", tuple(made.shown)
+        made.kind = "switch"
+        made.switch_on = tuple(values + [default] * (count - len(values)))
 
     def _sequence(self, made: Description) -> None:
         made.kind = "sequence"
-        made.shown = [number == 0 for number in range(len(made.children))]
-        text = f"sequence of {len(made.children)} nodes; the first is shown"
+        text = f"sequence of {len(made.children)} nodes; the first is selected, nothing runs"
         self._add(Kind.REPLACED, "osg-sequence", made, text)
 
     def _files(self, made: Description) -> list[str]:

@@ -128,7 +128,8 @@ class TextureReader:
             name = name or (files[0].words[0] if files and files[0].words else "")
             text = "image sequence; its first picture is used"
             document.add(Kind.DROPPED, "osg-image-sequence", holder, name, text)
-        if document.field(holder, "data") is not None:
+        empty = document.numbers(holder, 3, "size") == (0.0, 0.0, 0.0)  # osgconv found no file
+        if document.field(holder, "data") is not None and not (name and empty):
             key = id(holder)
             if key not in self._images:
                 self._images[key] = self._inline(name or f"inline_{holder.line}", holder)

@@ -128,6 +128,10 @@ class Mesh:
     subsets: tuple[Subset, ...] = ()
     two_sided: bool = True
     left_handed: bool = False
+    # Of a skinned mesh: k influences a point, (n, k); indices into ``Skin.joints``, weights of
+    # sum 1 (``legacy.skinning.influences`` makes them so). What k lacks is index 0, weight 0.
+    joint_indices: Ints | None = None
+    joint_weights: Floats | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +157,16 @@ class Light:
     lux: float | None = None  # likewise, for directional
     enabled: bool = True
     extras: Mapping[str, Any] = field(default_factory=dict)
+    # Of a string: the same lamp, which is itself seen, at each place and, where it has a beam and
+    # they differ, each its own way. ``position`` is not used, nor ``direction`` beside these.
+    positions: npt.NDArray[np.float64] | None = None  # (n, 3), source units, node space
+    directions: npt.NDArray[np.float64] | None = None  # (n, 3) unit vectors, node space
+    radius: float | None = None  # of the lamp, source units, where the file says
+
+    @property
+    def lamps(self) -> int:
+        """How many lamps it is."""
+        return 1 if self.positions is None else len(self.positions)
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,11 +208,27 @@ class TRS:
     scale: Vec3 = (1.0, 1.0, 1.0)
 
 
+@dataclass(frozen=True, slots=True)
+class Skin:
+    """What bends the meshes of a node: joints, which are nodes of the tree.
+
+    A point p of a mesh comes to stand at p sum_i w_i B_i J_i in the world, with the inverse
+    bind matrix B_i and the world matrix J_i of joint i now (row vectors): the place of the
+    node that has the mesh does not count.
+    """
+
+    name: str
+    source: SourceRef
+    joints: tuple[Node, ...]  # the very objects of the tree (identity), parents in any order
+    inverse_binds: npt.NDArray[np.float64]  # (j, 4, 4), mesh space -> joint space at bind time
+
+
 @dataclass(slots=True)
 class Node:
     """One node of the tree. ``transform`` is a TRS, a (4, 4) float64 row-vector matrix or None.
 
-    With ``animation`` the TRS gives the paths that no channel drives.
+    With ``animation`` the TRS gives the paths that no channel drives. The same object below
+    several parents, or several times below one, is one thing in several places.
     """
 
     name: str
@@ -209,11 +239,15 @@ class Node:
     lights: list[int] = field(default_factory=list)
     cameras: list[int] = field(default_factory=list)
     animation: tuple[Channel, ...] = ()
+    skin: int | None = None  # index into LegacyScene.skins: bends those meshes that have weights
     visible: bool = True
     kind: Literal["group", "lod", "switch", "sequence", "billboard"] = "group"
     #: For kind "lod": (min, max) distance of each child; for "switch": whether each child is on.
     lod_ranges: tuple[tuple[float, float], ...] = ()
+    lod_on_screen: bool = False  # ranges are the inverse of sizes on the screen, in pixels
     switch_on: tuple[bool, ...] = ()
+    #: All masks of a switch that has several, by name; ``switch_on`` is the current one.
+    switch_masks: tuple[tuple[str, tuple[bool, ...]], ...] = ()
     extras: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -228,6 +262,7 @@ class LegacyScene:
     materials: list[Material] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
     cameras: list[Camera] = field(default_factory=list)
+    skins: list[Skin] = field(default_factory=list)
     up: Literal["Y", "Z"] = "Y"
     unit_m: float = 1.0  # metres per source unit, as the format states or assumes
     ambient: RGB | None = None  # light model ambient, dimensionless, where the file sets it
@@ -241,11 +276,13 @@ class LegacyScene:
             for texture in (material.diffuse_map, material.emission_map, material.opacity_map)
             if texture is not None
         }
-        return {
+        points = sum(light.lamps for light in self.lights if light.positions is not None)
+        found = {
             "meshes": len(self.meshes),
             "triangles": int(sum(int((m.face_counts - 2).sum()) for m in self.meshes)),
             "materials": len(self.materials),
             "textures": len(images),
-            "lights": len(self.lights),
+            "lights": sum(light.positions is None for light in self.lights),
             "cameras": len(self.cameras),
         }
+        return found | {"light_points": points} if points else found

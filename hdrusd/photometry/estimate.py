@@ -18,6 +18,16 @@ from hdrusd.registry import Registry
 if TYPE_CHECKING:  # the command line's help lists the rules, and NumPy would slow it
     from hdrusd.legacy.scene import RGB, Light
 
+#: cd of a light point of colour and intensity 1, whatever the picture's illuminance: the least
+#: of a low-intensity runway edge light where other lights are about (ICAO Annex 14, vol. I, 5.3.9).
+#: By luminance a red one then has 10.6 cd (obstacle light of type A: 10), a blue 3.6 (taxiway
+#: edge: at least 2).
+LIGHT_POINT = 50.0
+
+#: Name and text of that rule, for the report.
+LIGHT_POINT_RULE = "light-point-50cd"
+LIGHT_POINT_TEXT = "intensity 1.0 of white is 50 cd (a low-intensity runway edge light)"
+
 #: Distance at which an unattenuated legacy light is taken to give E_ref: a tenth of the
 #: scene's diagonal, but at least this many metres.
 MIN_REFERENCE_DISTANCE = 1.0

@@ -1,8 +1,9 @@
 """What the lamps of a scene give at the eye: E = I(direction) / d^2, square to their rays.
 
-For the veil of lamps that no pixel shows, by E f(theta) (hdrusd.glare). Nothing stands in the
-way of their light: a lamp behind a wall counts like any other. A lamp that has a size is one at
-its centre, at least its own size away; so is the light of the scene's skies not in it.
+For the veil of lamps that no pixel shows, by E f(theta) (hdrusd.glare). A lamp that has a size
+is one at its centre, at least its own size away; so is the light of the scene's skies not in it.
+Whether something stands in the way of their light is not known here: what the frame holds, the
+frame can tell (gpu/small_lamps.py); a lamp beside it counts through walls.
 """
 
 from __future__ import annotations
@@ -24,10 +25,16 @@ def eye_illuminance(scene: RenderScene) -> Array:
     """Lamps outside the frame of the scene's camera, (n, 6).
 
     Rows: the unit vector towards one in view space (+x right, +y up, the camera looks along
-    -z), and lx per channel on a plane that faces it. Lamps in the frame have their own pixels
-    and are not among them, whether these show them or not. None for a camera that projects
-    in parallel, which is no eye's.
+    -z), and lx per channel on a plane that faces it. None for a camera that projects in
+    parallel, which is no eye's.
     """
+    rows = lamps_at_eye(scene)
+    shines = np.any(rows[:, 3:] > 0.0, axis=1) & np.all(np.isfinite(rows), axis=1)
+    return np.asarray(rows[shines & ~in_frame(rows[:, :3], scene.camera)])
+
+
+def lamps_at_eye(scene: RenderScene) -> Array:
+    """All lights of a scene, (n, 6), as rows of ``eye_illuminance``; (0, 6) for no eye's camera."""
     camera = scene.camera
     if camera.orthographic or not len(scene.lights):
         return np.zeros((0, 6))
@@ -39,9 +46,7 @@ def eye_illuminance(scene: RenderScene) -> Array:
     share = np.minimum(inverse_square(np.sqrt(d2)), inverse_square(nearest))
     share = np.where(lights["w"] > 0.0, share * _intensity(scene, away), 1.0)
     seen = -away @ camera.rotation()
-    rows = np.concatenate([seen, np.asarray(lights["intensity"]) * share[:, None]], axis=1)
-    shines = np.any(rows[:, 3:] > 0.0, axis=1) & np.all(np.isfinite(rows), axis=1)
-    return np.asarray(rows[shines & ~in_frame(seen, camera)])
+    return np.concatenate([seen, np.asarray(lights["intensity"]) * share[:, None]], axis=1)
 
 
 def in_frame(direction: Array, camera: Camera) -> npt.NDArray[np.bool_]:

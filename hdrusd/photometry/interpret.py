@@ -14,10 +14,17 @@ from typing import Literal
 
 from hdrusd.legacy import scene as legacy
 from hdrusd.legacy.scene import RGB
-from hdrusd.photometry.estimate import Estimate
+from hdrusd.photometry.estimate import (
+    LIGHT_POINT,
+    LIGHT_POINT_RULE,
+    LIGHT_POINT_TEXT,
+    Estimate,
+)
 from hdrusd.photometry.light import PhotometricLight, Provenance, chromaticity
 from hdrusd.photometry.luminaire import Luminaire, Opening
 from hdrusd.photometry.sidecar import Rule
+from hdrusd.photometry.spread import SHAPES, Beam
+from hdrusd.photometry.strength import STRENGTHS, note_wrong_unit, stated_candela
 from hdrusd.report import Kind, Report
 from hdrusd.units import LUMINANCE_WEIGHTS
 
@@ -26,6 +33,9 @@ LAMP_RADIUS = 0.05
 
 #: Radius of a lamp that has a size, m; a smaller one is a point, a larger one a mistake.
 _LEAST_RADIUS, _LARGEST_RADIUS = 1e-3, 1e3
+
+#: The largest lamp that a light point may be, m.
+_LARGEST_LAMP = 10.0
 
 #: The strongest light that is written, cd or lx: its luminance must fit into 32-bit floats.
 _STRONGEST = 1e30
@@ -47,6 +57,10 @@ def rule_color(rule: Rule | None, temperature: TemperatureToRGB) -> RGB | None:
     if color is not None and luminance(color) > 0.0:
         return chromaticity(color)[0]
     kelvin = rule.number("temperature")
+    if kelvin is None and rule.lamp is not None:
+        if rule.lamp.color is not None:
+            return chromaticity(rule.lamp.color)[0]
+        kelvin = rule.lamp.temperature
     return temperature(kelvin) if kelvin else None
 
 
@@ -105,6 +119,7 @@ class Interpreter:
             intensity, provenance, name, source = self._strength(light, rule, kind, strength)
         if rule is not None:
             color = rule_color(rule, self.temperature) or color
+            self._note_lamp_type(light, rule)
         if intensity <= 0.0:
             self._note(light, Kind.DROPPED, "light-dark", "gives no light; not written")
             return None
@@ -146,8 +161,14 @@ class Interpreter:
     def _radius(
         self, light: legacy.Light, rule: Rule | None, of_file: float | None = None
     ) -> float:
-        """The lamp's size: the rule's, else the photometric file's, else a stated guess."""
+        """The lamp's size: of the rule, the photometric file, the source, else a stated guess."""
         radius = (rule.number("radius") if rule else None) or of_file
+        if radius is None and light.radius is not None:
+            radius = light.radius * self.unit
+            if not _LEAST_RADIUS <= radius <= _LARGEST_LAMP:
+                text = f"lamp of {radius:.3g} m radius; {LAMP_RADIUS} m is used"
+                self._note(light, Kind.INVALID, "lamp-radius", text)
+                radius = LAMP_RADIUS
         if radius is None:
             radius = LAMP_RADIUS
             text = f"lamp of {LAMP_RADIUS} m radius; none is stated"
@@ -158,19 +179,29 @@ class Interpreter:
         self, lamp: PhotometricLight, light: legacy.Light, rule: Rule | None
     ) -> PhotometricLight:
         """What only a light with a place has: a cone, a focus, a size."""
-        cutoff, softness = 180.0, 0.0
-        if light.spot_cutoff < 180.0:
-            cutoff = max(light.spot_cutoff, 0.0)
-            if light.spot_inner is not None and cutoff > 0.0:
-                softness = 1.0 - min(max(light.spot_inner, 0.0), cutoff) / cutoff
+        beam = _beam(light, rule)
         return replace(
             lamp,
-            kind="spot" if cutoff < 180.0 or light.spot_exponent > 0.0 else "point",
-            cutoff=cutoff,
-            softness=softness,
-            exponent=max(light.spot_exponent, 0.0),
+            kind="spot" if beam.shaped else "point",
+            cutoff=beam.cutoff,
+            softness=beam.softness,
+            exponent=beam.exponent,
             radius=self._radius(light, rule),
         )
+
+    def _note_lamp_type(self, light: legacy.Light, rule: Rule) -> None:
+        """What a lamp's type says of its colour and S/P where the entry leaves it to it."""
+        lamp = rule.lamp
+        if lamp is None:
+            return
+        taken: list[str] = []
+        if not {"temperature", "color"} & rule.values.keys():
+            taken.append("its colour" if lamp.color else f"{lamp.temperature:g} K")
+        if not {"sp_ratio", "illuminant"} & rule.values.keys():
+            taken.append(f"S/P {rule.sp:.3g} ({lamp.sp_source})")
+        if taken:
+            text = f"{' and '.join(taken)} by lamp type {lamp.name}; {rule.place} does not say"
+            self._note(light, Kind.ASSUMED, "lamp-type", text)
 
     def _without_negative_colours(self, light: legacy.Light) -> legacy.Light:
         """OpenGL lets a light take light away; a lamp does not."""
@@ -187,18 +218,18 @@ class Interpreter:
         self, light: legacy.Light, rule: Rule | None, kind: str, luminance_of_color: float
     ) -> tuple[float, Provenance, str, str]:
         """(cd or lx, provenance, rule, source) by the first that knows."""
-        key, other = ("illuminance", "candela") if kind == "distant" else ("candela", "illuminance")
-        if rule is not None:
-            value = rule.number(key)
-            if value is not None:
-                return value, rule.provenance, f"{rule.place}", rule.source
-            if other in rule.values:
-                self._note(
-                    light, Kind.INVALID, "sidecar-unit", f"{rule.place} says {other}; want {key}"
-                )
-        stated = light.lux if kind == "distant" else light.candela
+        stated = None if rule is None else self._stated(light, rule, kind)
         if stated is not None:
-            return stated * luminance_of_color, "authored", "source file", ""
+            return stated
+        own = light.lux if kind == "distant" else light.candela
+        if own is not None:
+            return own * luminance_of_color, "authored", "source file", ""
+        if light.positions is not None:
+            value = LIGHT_POINT * luminance_of_color
+            text = f"{light.lamps} lamps of {value:.4g} cd each by rule {LIGHT_POINT_RULE}"
+            text = f"{text}; the source has no unit"
+            self._note(light, Kind.GUESSED, "light-estimate", text)
+            return value, "estimated", LIGHT_POINT_RULE, LIGHT_POINT_TEXT
         value = self.estimate.strength(self._in_metres(light), self.diagonal) * luminance_of_color
         unit = "lx" if kind == "distant" else "cd"
         self._note(
@@ -209,6 +240,29 @@ class Interpreter:
         )
         return value, "estimated", self.estimate.name, self.estimate.text
 
+    def _stated(
+        self, light: legacy.Light, rule: Rule, kind: str
+    ) -> tuple[float, Provenance, str, str] | None:
+        """The same by the photometry file; None where it does not say."""
+
+        def note(kind: Kind, code: str, text: str) -> None:
+            self._note(light, kind, code, text)
+
+        if kind == "distant":
+            lux = rule.number("illuminance")
+            if lux is None:
+                others = tuple(key for key in STRENGTHS if key != "illuminance")
+                note_wrong_unit(rule, "illuminance", others, note)
+                return None
+            note_wrong_unit(rule, "illuminance alone", ("distance",), note)
+            return lux, rule.provenance, str(rule.place), rule.source
+        made = stated_candela(rule, _beam(light, rule), note)
+        if made is None:
+            wanted = "candela, lumens, watts, or a distance beside it"
+            note_wrong_unit(rule, wanted, ("illuminance",), note)
+            return None
+        return made.value, made.provenance, made.rule, made.source
+
     def _in_metres(self, light: legacy.Light) -> legacy.Light:
         """The light with its attenuation per metre instead of per source unit."""
         if light.attenuation is None:
@@ -218,9 +272,9 @@ class Interpreter:
 
     def _ambient_light(self, light: legacy.Light, rule: Rule | None) -> PhotometricLight | None:
         value = rule.number("illuminance") if rule else None
-        if rule is not None and "candela" in rule.values:
-            text = f"{rule.place} says candela; want illuminance"
-            self._note(light, Kind.INVALID, "sidecar-unit", text)
+        if rule is not None:
+            others = tuple(key for key in STRENGTHS if key != "illuminance")
+            note_wrong_unit(rule, "illuminance", others, lambda *found: self._note(light, *found))
         if rule is not None and rule.sp:
             text = f"{rule.place}: the S/P of the ambient light is not used; its colour tells"
             self._note(light, Kind.DROPPED, "light-scotopic", text)
@@ -289,10 +343,14 @@ class Interpreter:
             )
 
     def emission(
-        self, material: legacy.Material, rule: Rule | None
+        self, material: legacy.Material, rule: Rule | None, stated: float | None = None
     ) -> tuple[RGB, Provenance, str, str]:
-        """Emission in cd/m2 per channel at 1.0 of its texture: (rgb, provenance, rule, source)."""
-        stated = rule.number("luminance") if rule else None
+        """Emission in cd/m2 per channel at 1.0 of its texture: (rgb, provenance, rule, source).
+
+        ``stated``: what the rule's candela or lumens make, else its luminance counts.
+        """
+        if stated is None and rule is not None:
+            stated = rule.number("luminance")
         if rule is not None and stated is not None:
             color = rule_color(rule, self.temperature)
             if color is None and luminance(material.emission) > 0.0:
@@ -320,6 +378,19 @@ class Interpreter:
         self, thing: legacy.Light | legacy.Material, kind: Kind, code: str, text: str
     ) -> None:
         self.report.add(kind, code, thing.source, thing.name, text)
+
+
+def _beam(light: legacy.Light, rule: Rule | None) -> Beam:
+    """The cone and focus of a light; those of the rule's ``spread`` where it has none."""
+    cutoff, softness = 180.0, 0.0
+    if light.spot_cutoff < 180.0:
+        cutoff = max(light.spot_cutoff, 0.0)
+        if light.spot_inner is not None and cutoff > 0.0:
+            softness = 1.0 - min(max(light.spot_inner, 0.0), cutoff) / cutoff
+    beam = Beam(cutoff, softness, max(light.spot_exponent, 0.0))
+    if beam.shaped or rule is None:
+        return beam
+    return SHAPES.get(rule.values.get("spread", "sphere"), beam)
 
 
 def _factor(rule: Rule, luminaire: Luminaire) -> float:

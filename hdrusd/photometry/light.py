@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.scene import POINT, SPHERE
+from hdrusd.scene import NO_CONE, POINT, SPHERE
 from hdrusd.units import LUMINANCE_WEIGHTS
 
 RGB = tuple[float, float, float]
@@ -69,6 +69,12 @@ def shines_as(lights: npt.NDArray[np.void] | np.void) -> npt.NDArray[np.int32]:
     """(n,) the LIGHT.shape by which lights shine: a small ball, and what is distant, as POINT."""
     small = (lights["shape"] == SPHERE) & (lights["radius"] <= SMALL_SPHERE)
     return np.where(small | (lights["w"] == 0.0), POINT, lights["shape"])
+
+
+def has_beam(lights: npt.NDArray[np.void]) -> npt.NDArray[np.bool_]:
+    """(n,) which LIGHT rows have a cone, a focus or a photometric file."""
+    cone = lights["outer"] < NO_CONE
+    return np.asarray(cone | (lights["exponent"] > 0.0) | (lights["profile"] >= 0))
 
 
 def angle_from_cosine(cosine: Array) -> Array:

@@ -2,12 +2,23 @@
 
     gamma = 2.2
     [ambient]
-    illuminance = 0.05          # lx
+    illuminance = 0.05          # lx; or preset = "moonlit", with altitude and azimuth
     [[light]]
     match = "Luminaire_*"       # shell pattern on the light's or its node's name
     candela = 3200
     illuminant = "HP1"          # the lamp's kind of light (CIE), for its S/P; or sp_ratio = 0.6
     fixture_shadow = true       # the mesh that it stands in shades it
+    [[light]]
+    match = "Bulb_*"
+    lumens = 800                # with spread: sphere, hemisphere, lambert, cone
+    [[light]]
+    match = "Headlamp_*"
+    illuminance = 20            # lx at a distance, in the far field
+    distance = 25               # m
+    [[light]]
+    match = "Lantern_*"
+    watts = 70                  # electric
+    lamp = "high-pressure-sodium"  # photometry/lamp_types.py; or efficacy, lm/W
     [[light]]
     match = "RoadLamp_*"
     ies = "road.ies"            # LM-63 or EULUMDAT, relative to this file
@@ -16,7 +27,7 @@
     c0 = [1, 0, 0]              # where C = 0 points
     [[material]]
     match = "LampGlass*"
-    luminance = 12000           # cd/m2
+    luminance = 12000           # cd/m2; or candela or lumens, with area, m2
     [[material]]
     match = "WetRoad"
     diffuse = [0.5, 0.5, 0.5]   # D of R = T^gamma D
@@ -39,104 +50,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
-from textwrap import shorten
-from typing import Any, get_args
+from typing import Any
 
 from hdrusd.errors import InputError, SourceRef
+from hdrusd.photometry.lamp_types import LAMP_TYPES, LampType
 from hdrusd.photometry.light import Provenance
+from hdrusd.photometry.recipe_keys import GAMMA, KEYS, checked, fits, invalid, shown, unknown
 from hdrusd.photometry.scotopic_light import ILLUMINANTS
 from hdrusd.report import Kind, Report
 
 #: The name under which it is looked for beside the source.
 FILE_NAME = "photometry.toml"
-
-
-@dataclass(frozen=True, slots=True)
-class _Range:
-    """Numbers that a key takes, ends included."""
-
-    least: float
-    most: float
-
-    def __str__(self) -> str:
-        return f"a number from {self.least:g} to {self.most:g}"
-
-
-@dataclass(frozen=True, slots=True)
-class _Three:
-    """A list of three numbers that a key takes; ``some``: not all of them 0."""
-
-    each: _Range
-    some: str = ""  # what three zeros lack
-
-    def __str__(self) -> str:
-        return f"three of {self.each}"
-
-
-#: cd, lx or cd/m2: 32-bit floats end at 3e38, and a lamp of 1 mm makes nits of candela times 3e5.
-_STRENGTH = _Range(0.0, 1e30)
-_KELVIN = _Range(1000.0, 10_000.0)  # the range of UsdLux's blackbody colours
-_GAMMA = _Range(0.1, 10.0)
-_RGB = _Three(_Range(0.0, 1e6))
-_HUE = _Three(_RGB.each, "black has no hue; want a number above 0")
-_DIRECTION = _Three(_Range(-1e6, 1e6), "no direction; want a number other than 0")
-_COMMON: dict[str, Any] = {"match": str, "source": str, "provenance": str}
-_KEYS: dict[str, dict[str, Any]] = {
-    "light": _COMMON
-    | {
-        "candela": _STRENGTH,
-        "illuminance": _STRENGTH,
-        "temperature": _KELVIN,
-        "color": _HUE,
-        "ies": str,
-        "scale": _Range(0.0, 1e6),
-        "lumens": _STRENGTH,
-        "axis": _DIRECTION,
-        "c0": _DIRECTION,
-        "radius": _Range(1e-3, 1e3),  # m
-        "sp_ratio": _Range(0.01, 100.0),
-        "illuminant": str,
-        "fixture_shadow": bool,
-        "enabled": bool,
-    },
-    "material": _COMMON
-    | {
-        "luminance": _STRENGTH,
-        "hdr_texture": bool,
-        "temperature": _KELVIN,
-        "color": _HUE,
-        "diffuse": _RGB,
-        "gamma": _GAMMA,
-        "specular": _Three(_Range(0.0, 1.0)),
-        "roughness": _Range(0.0, 1.0),
-        "shininess": _Range(0.0, 1e5),
-    },
-    "camera": {
-        "match": str,
-        "fov": _Range(0.1, 179.0),  # degrees
-        "near": _Range(1e-6, 1e9),  # source units
-        "far": _Range(1e-6, 1e12),
-    },
-    "node": {"match": str, "visible": bool},
-}
-_AMBIENT = {
-    "illuminance": _STRENGTH,
-    "temperature": _KELVIN,
-    "color": _HUE,
-    "source": str,
-    "provenance": str,
-}
-
-#: Keys that say something only beside another one.
-_COMPANIONS = {"scale": "ies", "lumens": "ies", "axis": "ies", "c0": "ies"}
-
-#: Of two keys that say one thing the first counts.
-_RIVALS = (
-    ("lumens", "scale"),
-    ("ies", "candela"),
-    ("sp_ratio", "illuminant"),
-    ("roughness", "shininess"),
-)
 
 
 @dataclass(slots=True)
@@ -151,8 +75,8 @@ class Rule:
 
     @property
     def pattern(self) -> str:
-        """The shell pattern, case counts."""
-        return str(self.values["match"])
+        """The shell pattern, case counts; a lamp that has places instead goes by its name."""
+        return str(self.values.get("match", self.values.get("name", "Lamp")))
 
     def number(self, key: str) -> float | None:
         """A number, or None where the rule does not say."""
@@ -165,10 +89,19 @@ class Rule:
         return None if value is None else (float(value[0]), float(value[1]), float(value[2]))
 
     @property
+    def lamp(self) -> LampType | None:
+        """The type of the lamp, or None where the rule does not say."""
+        return LAMP_TYPES.get(self.values.get("lamp", ""))
+
+    @property
     def sp(self) -> float:
-        """The S/P of the lamp, stated or by its kind; 0 where the rule does not say."""
+        """The S/P of the lamp, stated or by its kind or type; 0 where the rule does not say."""
         stated = self.number("sp_ratio")
-        return ILLUMINANTS.get(self.values.get("illuminant", ""), 0.0) if stated is None else stated
+        if stated is not None:
+            return stated
+        if "illuminant" in self.values or self.lamp is None:
+            return ILLUMINANTS.get(self.values.get("illuminant", ""), 0.0)
+        return self.lamp.sp(self.number("temperature"))
 
     @property
     def provenance(self) -> Provenance:
@@ -188,6 +121,7 @@ class Sidecar:
     path: Path | None = None
     gamma: float | None = None
     ambient: Rule | None = None
+    light_unit: str = "nits"  # of a USD source: a name of photometry.light_unit.LIGHT_UNITS
     rules: list[Rule] = field(default_factory=list)
 
     def match(self, section: str, *names: str) -> Rule | None:
@@ -214,7 +148,7 @@ class Sidecar:
                     rule.pattern,
                     "what it fits is taken by a pattern before it; want the narrower one first"
                     if rule.late
-                    else f"no {rule.section} of that name",
+                    else f"no {'node' if rule.section == 'lamp' else rule.section} of that name",
                 )
 
 
@@ -230,26 +164,35 @@ def read_sidecar(path: Path, report: Report) -> Sidecar:
     for key, value in document.items():
         place = SourceRef(path, key)
         if key == "gamma":
-            if _fits(value, _GAMMA):
+            if fits(value, GAMMA):
                 sidecar.gamma = float(value)
             else:
-                _invalid(report, place, "", f"{_shown(value)}; want {_GAMMA}")
+                invalid(report, place, "", f"{shown(value)}; want {GAMMA}")
+        elif key == "usd":
+            sidecar.light_unit = _read_light_unit(value, place, report)
         elif key == "ambient":
             sidecar.ambient = _read_ambient(value, place, report)
-        elif key in _KEYS:
+        elif key in KEYS:
             _read_section(sidecar, key, value, report)
         else:
-            _unknown(report, place, key)
+            unknown(report, place, key)
     return sidecar
+
+
+def _read_light_unit(table: Any, place: SourceRef, report: Report) -> str:
+    if not isinstance(table, dict):
+        invalid(report, place, "", "want a table, [usd]")
+        return "nits"
+    return str(checked(table, "usd", place, report).get("light_unit", "nits"))
 
 
 def _read_ambient(table: Any, place: SourceRef, report: Report) -> Rule | None:
     if not isinstance(table, dict):
-        _invalid(report, place, "", "want a table, [ambient]")
+        invalid(report, place, "", "want a table, [ambient]")
         return None
-    values = _checked(table, _AMBIENT, place, report)
-    if "illuminance" not in values:
-        _invalid(report, place, "", "no illuminance (lx); not used")
+    values = checked(table, "ambient", place, report)
+    if "illuminance" not in values and "preset" not in values:
+        invalid(report, place, "", "no illuminance (lx) and no preset; not used")
         return None
     return Rule("ambient", place, values)
 
@@ -257,76 +200,13 @@ def _read_ambient(table: Any, place: SourceRef, report: Report) -> Rule | None:
 def _read_section(sidecar: Sidecar, section: str, tables: Any, report: Report) -> None:
     assert sidecar.path is not None
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-        _invalid(report, SourceRef(sidecar.path, section), "", f"want tables, [[{section}]]")
+        invalid(report, SourceRef(sidecar.path, section), "", f"want tables, [[{section}]]")
         return
     for number, table in enumerate(tables, start=1):
         place = SourceRef(sidecar.path, f"{section}[{number}]")
-        values = _checked(table, _KEYS[section], place, report)
-        _note_company(values, place, report)
-        if "match" in values:
+        values = checked(table, section, place, report)
+        if "match" in values or (section == "lamp" and "at" in values):
             sidecar.rules.append(Rule(section, place, values))
         else:
-            _invalid(report, place, "", "no match; want a name or a pattern")
-
-
-def _checked(
-    table: Mapping[str, Any], keys: Mapping[str, Any], place: SourceRef, report: Report
-) -> dict[str, Any]:
-    """The keys that are known and of the right kind; the rest are findings."""
-    good: dict[str, Any] = {}
-    for key, value in table.items():
-        if key not in keys:
-            _unknown(report, place, key)
-        elif not _fits(value, keys[key]):
-            _invalid(report, place, key, f"{_shown(value)}; want {_wanted(keys[key])}")
-        elif key == "provenance" and value not in get_args(Provenance):
-            _invalid(report, place, key, f"{_shown(value)}; want {', '.join(get_args(Provenance))}")
-        elif key == "illuminant" and value not in ILLUMINANTS:
-            _invalid(report, place, key, f"{_shown(value)}; want {', '.join(ILLUMINANTS)}")
-        elif isinstance(keys[key], _Three) and keys[key].some and not any(value):
-            _invalid(report, place, key, keys[key].some)
-        else:
-            good[key] = value
-    return good
-
-
-def _note_company(values: Mapping[str, Any], place: SourceRef, report: Report) -> None:
-    """A finding for each key that lacks its companion, or has a rival."""
-    for key, companion in _COMPANIONS.items():
-        if key in values and companion not in values:
-            _invalid(report, place, key, f"not used without {companion}")
-    for first, second in _RIVALS:
-        if first in values and second in values:
-            text = f"{first} beside it says the same and is used"
-            report.add(Kind.INVALID, "sidecar-rival", place, second, text)
-
-
-def _fits(value: Any, kind: Any) -> bool:
-    if isinstance(kind, _Three):
-        three = isinstance(value, list) and len(value) == 3
-        return three and all(_fits(v, kind.each) for v in value)
-    if isinstance(kind, _Range):
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        return number and kind.least <= value <= kind.most
-    return isinstance(value, kind)
-
-
-def _wanted(kind: Any) -> str:
-    if isinstance(kind, (_Range, _Three)):
-        return str(kind)
-    return "true or false" if kind is bool else "a string"
-
-
-def _shown(value: Any) -> str:
-    """A value as a message quotes it: Python has no text for an integer of 5,000 digits."""
-    if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 64:
-        return "a number of more than 64 bits"
-    return shorten(repr(value), 60)
-
-
-def _unknown(report: Report, place: SourceRef, key: str) -> None:
-    report.add(Kind.DROPPED, "sidecar-unknown-key", place, key, "unknown key; not used")
-
-
-def _invalid(report: Report, place: SourceRef, thing: str, text: str) -> None:
-    report.add(Kind.INVALID, "sidecar-invalid", place, thing, text)
+            wanted = "at, places, or match" if section == "lamp" else "a name or a pattern"
+            invalid(report, place, "", f"no match; want {wanted}")

@@ -88,17 +88,38 @@ def proportional(scale: float, white: float, black: float = 0.0) -> Curve:
     return Curve(end - 1.0, end, np.array([top - 1.0, top]), black, white)
 
 
+def curve_at(rgb: npt.ArrayLike, uniforms: Mapping[str, Any]) -> Array:
+    """The number of a step, and how far on in it, for cd/m2 (..., 3)."""
+    return _place(luminance(np.asarray(rgb, np.float64)), uniforms)
+
+
+def curve_step(at: npt.ArrayLike, uniforms: Mapping[str, Any]) -> Array:
+    """(..., 2) where the step at a place begins, and its rise."""
+    return np.asarray(np.asarray(uniforms["curve_steps"], np.float64)[0][_number(at, uniforms)])
+
+
+def curve_shown(at: npt.ArrayLike, step: npt.ArrayLike, uniforms: Mapping[str, Any]) -> Array:
+    """Display-relative value in [0, 1] at a place in a ``step`` (..., 2)."""
+    top, black = uniforms["curve_to"]
+    step = np.asarray(step)
+    shown = step[..., 0] + (np.asarray(at) - _number(at, uniforms)) * step[..., 1]
+    # Cut before the exponential, which the sun would overflow in float32.
+    return np.asarray(np.clip(np.exp2(np.minimum(shown, top)) - black, 0.0, 1.0))
+
+
 def curve_value(y: npt.ArrayLike, uniforms: Mapping[str, Any]) -> Array:
     """Display-relative value in [0, 1] for a scene luminance in cd/m2, any shape."""
-    steps = np.asarray(uniforms["curve_steps"], np.float64)[0]
+    at = _place(np.asarray(y, np.float64), uniforms)
+    return curve_shown(at, curve_step(at, uniforms), uniforms)
+
+
+def _place(y: Array, uniforms: Mapping[str, Any]) -> Array:
     factor, summand = uniforms["curve_place"]
-    top, black = uniforms["curve_to"]
-    place = np.log2(np.maximum(np.asarray(y, np.float64), LEAST)) * factor + summand
-    step = np.clip(place, 0, len(steps) - 1).astype(np.intp)
-    shown = steps[step, 0] + (place - step) * steps[step, 1]
-    # Cut before the exponential, which the sun would overflow in float32.
-    value: Array = np.clip(np.exp2(np.minimum(shown, top)) - black, 0.0, 1.0)
-    return value
+    return np.asarray(np.log2(np.maximum(y, LEAST)) * factor + summand)
+
+
+def _number(at: npt.ArrayLike, uniforms: Mapping[str, Any]) -> npt.NDArray[np.intp]:
+    return np.asarray(np.clip(at, 0, uniforms["curve_last"]), np.intp)
 
 
 def curve(rgb: npt.ArrayLike, uniforms: Mapping[str, Any]) -> Array:

@@ -205,13 +205,14 @@ def fill(
     n = h.counts.size
     bottom, span = math.log(low), math.log(high / low)
     counts = h.counts + floor * h.counts.mean()
-    edges, scene = h.edges, np.exp(h.centres)
+    edges, width, scene = h.edges, h.width, np.exp(h.centres)
     seen = scene / scene_threshold
     # Contrast may grow without bound only in scenes of 1.25 display ranges and more.
     narrow = min(max(((h.bmax - h.bmin) / span - 1.0) / _NARROW, 0.0), 1.0)
     most = math.inf if narrow == 1.0 else 1.0 / (1.0 - narrow)
     wanted = math.log(anchor.display) - bottom
     goal = math.log(anchor.scene)
+    bright = np.where(h.centres > goal, highlights, 0.0)
     if start is None:
         log_display = bottom + span * (np.arange(n) + 0.5) / n
     else:
@@ -221,13 +222,12 @@ def fill(
     for number in range(_PASSES):
         shown = np.exp(log_display)
         ceiling = np.minimum(display_threshold(shown) / shown * seen, most)
-        slope = level(counts, ceiling, span / h.width)
-        np.cumsum(slope * h.width, out=u[1:])
+        slope = level(counts, ceiling, span / width)
+        np.cumsum(slope * width, out=u[1:])
         offset = min(max(wanted - float(np.interp(goal, edges, u)), 0.0), max(span - u[-1], 0.0))
         spare = span - offset - u[-1]
         if highlights > 0.0 and spare > 0.0:
-            brighter = np.where(h.centres > goal, np.maximum(highlights - slope, 0.0), 0.0)
-            u[1:] += np.minimum(np.cumsum(brighter * h.width), spare)
+            u[1:] += np.minimum(np.cumsum(np.maximum(bright - slope, 0.0) * width), spare)
         last, change = change, bottom + offset + 0.5 * (u[:-1] + u[1:]) - log_display
         if float(np.abs(change).max()) < _CONVERGED:
             break

@@ -1,4 +1,7 @@
-"""The sky of a stage: ``read_ambient``, lux from everywhere alike, and domes with pictures."""
+"""The sky of a stage: lux from everywhere alike, and domes with pictures.
+
+``write_ambient`` and ``read_ambient``.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Gf, Sdf, Usd, UsdGeom
 
+from hdrusd.photometry.light import PhotometricLight
 from hdrusd.report import Kind, Report
 from hdrusd.scene import RGB, Sky
 from hdrusd.usd.dome import dome_picture, read_sky
@@ -24,6 +28,17 @@ def has_ambient(stage: Usd.Stage) -> bool:
     """Whether the default prim states a sky."""
     root = stage.GetDefaultPrim()
     return bool(root) and bool(root.HasAPI(API))
+
+
+def write_ambient(root: Usd.Prim, light: PhotometricLight, dome: Sdf.Path) -> None:
+    """State on the default prim the sky that the light at ``dome`` says to other renderers."""
+    root.ApplyAPI(API)
+    types = Sdf.ValueTypeNames
+    lux = root.CreateAttribute("photometric:ambient:illuminance", types.Float, False)
+    lux.Set(light.intensity)
+    color = root.CreateAttribute("photometric:ambient:color", types.Color3f, False)
+    color.Set(Gf.Vec3f(*light.chromaticity))
+    root.CreateRelationship("photometric:ambient:light", False).SetTargets([dome])
 
 
 def read_ambient(

@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from hdrusd.photometry.light import has_beam
 from hdrusd.scene import (
     CYLINDER,
     DISK,
-    NO_CONE,
     POINT,
     RECT,
     RGB,
@@ -137,8 +137,7 @@ class Emitters:
 
 def beamed_balls(rows: Rows) -> npt.NDArray[np.bool_]:
     """(n,) which lamps shine, have a size, and are not seen: balls with a beam."""
-    beam = (rows["outer"] < NO_CONE) | (rows["exponent"] > 0.0) | (rows["profile"] >= 0)
-    return np.asarray((rows["shape"] == SPHERE) & beam & _shining(rows))
+    return np.asarray((rows["shape"] == SPHERE) & has_beam(rows) & _shining(rows))
 
 
 def _moves(item: tuple[tuple[bool, TextureUse | None], list[Rows]]) -> bool:

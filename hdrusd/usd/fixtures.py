@@ -7,7 +7,7 @@ taken as it is at the stage's first time.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -57,13 +57,20 @@ class Lamp:
 
 
 def find_fixtures(
-    stage: Usd.Stage, scene: LegacyScene, placed: Sequence[PlacedMesh], lamps: Sequence[Lamp]
+    stage: Usd.Stage,
+    scene: LegacyScene,
+    placed: Sequence[PlacedMesh],
+    lamps: Sequence[Lamp],
+    together: Callable[[Sdf.Path, Sdf.Path], bool],
 ) -> None:
-    """Fill in ``fixtures`` and ``too_large`` of lamps."""
+    """Fill in ``fixtures`` and ``too_large`` of lamps.
+
+    ``together``: whether things at two paths are ever shown at once.
+    """
     cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
     unit = UsdGeom.GetStageMetersPerUnit(stage)
     if lamps and placed:
-        _Search(scene, cache, unit, lamps).run(placed)
+        _Search(scene, cache, unit, lamps, together).run(placed)
 
 
 def free_from(light: Usd.Prim, meshes: Iterable[PlacedMesh]) -> None:
@@ -77,9 +84,15 @@ class _Search:
     """One search: mesh by mesh, so that the triangles of each are in the world once."""
 
     def __init__(
-        self, scene: LegacyScene, cache: UsdGeom.XformCache, unit: float, lamps: Sequence[Lamp]
+        self,
+        scene: LegacyScene,
+        cache: UsdGeom.XformCache,
+        unit: float,
+        lamps: Sequence[Lamp],
+        together: Callable[[Sdf.Path, Sdf.Path], bool],
     ) -> None:
         self.scene = scene
+        self.together = together
         self.stage = lamps[0].prim.GetStage()
         self.cache = cache
         self.unit = unit
@@ -103,8 +116,12 @@ class _Search:
             if box is None:
                 continue
             world = self._world(each.node)
-            near = self._near(*_placed_box(box, world))
-            if not len(near) or not self._shown(each.node):
+            near = [
+                number
+                for number in self._near(*_placed_box(box, world)).tolist()
+                if self.together(each.path, self.lamps[number].prim.GetPath())
+            ]
+            if not near or not self._shown(each.node):
                 continue
             triangles = _triangles(self.scene.meshes[each.mesh], opaque)
             if len(triangles) == 0:
@@ -122,7 +139,7 @@ class _Search:
             held = [mesh for mesh, it in large if it.holds(rays.weight, ALONE)]
             lamp.too_large = held[0] if held else None
 
-    def _look(self, mesh: PlacedMesh, triangles: Floats, near: npt.NDArray[np.intp]) -> None:
+    def _look(self, mesh: PlacedMesh, triangles: Floats, near: Sequence[int]) -> None:
         """What a mesh stops of the lamps that are near its box."""
         low, high = triangles.min(axis=1), triangles.max(axis=1)
         size = float(np.linalg.norm(high.max(axis=0) - low.min(axis=0)))

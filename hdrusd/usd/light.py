@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from pxr import Gf, Sdf, Usd, UsdLux
 
+from hdrusd.photometry.confidence import confidence
 from hdrusd.photometry.light import PhotometricLight
 from hdrusd.report import Kind, Report
 from hdrusd.scene import light_rows
@@ -29,9 +30,9 @@ DISTANT_ANGLE = 0.53
 #: How far plain and photometric values may differ before that is said.
 AGREEMENT = 1e-3
 
-_API = "HdrusdPhotometricLightAPI"
-_INTENSITY = "inputs:photometric:luminousIntensity"
-_ILLUMINANCE = "inputs:photometric:illuminance"
+API = "HdrusdPhotometricLightAPI"
+INTENSITY = "inputs:photometric:luminousIntensity"
+ILLUMINANCE = "inputs:photometric:illuminance"
 
 
 def write_light(
@@ -63,18 +64,25 @@ def write_light(
     api = UsdLux.LightAPI(prim)
     api.CreateColorAttr(color)
     api.CreateNormalizeAttr(False)
-    prim.ApplyAPI(_API)
+    write_origin(prim, light)
     if not light.profile:
-        name = _INTENSITY if light.kind in ("point", "spot") else _ILLUMINANCE
+        name = INTENSITY if light.kind in ("point", "spot") else ILLUMINANCE
         prim.CreateAttribute(name, Sdf.ValueTypeNames.Float, False).Set(light.intensity)
     if light.sp:
         prim.CreateAttribute(f"inputs:{SP_RATIO}", Sdf.ValueTypeNames.Float, False).Set(light.sp)
+    return prim
+
+
+def write_origin(prim: Usd.Prim, light: PhotometricLight) -> None:
+    """Apply our schema and say where the light's numbers come from."""
+    prim.ApplyAPI(API)
     _uniform(prim, "photometric:provenance", Sdf.ValueTypeNames.Token, light.provenance)
     if light.rule:
         _uniform(prim, "photometric:rule", Sdf.ValueTypeNames.String, light.rule)
     if light.source:
         _uniform(prim, "photometric:source", Sdf.ValueTypeNames.String, light.source)
-    return prim
+    trust = confidence(light.provenance, light.rule, light.source)
+    _uniform(prim, "photometric:confidence", Sdf.ValueTypeNames.Token, trust)
 
 
 def write_legacy_falloff(
@@ -191,7 +199,7 @@ def _photometric(
     usable = luminance > 0.0 and math.isfinite(luminance)
     color = rgb / luminance if usable else np.ones(3)
     distant = reading.kind in ("distant", "dome")
-    name = _ILLUMINANCE if distant else _INTENSITY
+    name = ILLUMINANCE if distant else INTENSITY
     attribute = prim.GetAttribute(name)
     if not attribute or not attribute.HasAuthoredValue():
         return luminance, color

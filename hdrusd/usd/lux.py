@@ -135,21 +135,37 @@ def read_lux(
         return None
     kind = light_kind(prim)
     normalize = normalized(prim, time)
-    radius = 0.0
     if kind == "other":
-        return LuxReading((0.0, 0.0, 0.0), kind, radius)
-    if kind == "dome":
-        factor = units.dome_illuminance(1.0)
-    elif kind == "distant":
-        factor = _distant_factor(input_number(prim, "angle", time), normalize)
-    else:
-        if world is None:
-            world = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(time)
-        if meters_per_unit is None:
-            meters_per_unit = UsdGeom.GetStageMetersPerUnit(prim.GetStage())
-        factor, radius = _area_factor(prim, kind, time, normalize, world, meters_per_unit)
+        return LuxReading((0.0, 0.0, 0.0), kind, 0.0)
+    factor, radius = strength_per_nit(prim, time, normalize, world, meters_per_unit)
     red, green, blue = (channel * factor for channel in nits(prim, time))
     return LuxReading((red, green, blue), kind, radius)
+
+
+def strength_per_nit(
+    prim: Usd.Prim,
+    time: Usd.TimeCode,
+    normalize: bool,
+    world: Gf.Matrix4d | None = None,
+    meters_per_unit: float | None = None,
+) -> tuple[float, float]:
+    """Candela on the axis (m2), or lux, that 1 nit makes of a light, and its radius (m).
+
+    The first column, or with ``normalize`` the second, of the table above; (0, 0) for lights
+    of kind "other". ``world``, ``meters_per_unit``: as for ``read_lux``.
+    """
+    kind = light_kind(prim)
+    if kind == "other":
+        return 0.0, 0.0
+    if kind == "dome":
+        return units.dome_illuminance(1.0), 0.0
+    if kind == "distant":
+        return _distant_factor(input_number(prim, "angle", time), normalize), 0.0
+    if world is None:
+        world = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(time)
+    if meters_per_unit is None:
+        meters_per_unit = UsdGeom.GetStageMetersPerUnit(prim.GetStage())
+    return _area_factor(prim, kind, time, normalize, world, meters_per_unit)
 
 
 def normalized(prim: Usd.Prim, time: Usd.TimeCode) -> bool:

@@ -15,6 +15,7 @@ from typing import Any
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
 from hdrusd.legacy.scene import RGB, Material, Texture, UVTransform
+from hdrusd.photometry.confidence import confidence
 from hdrusd.usd.preview import roughness_from_shininess
 
 _API = "HdrusdPhotometricMaterialAPI"
@@ -96,6 +97,8 @@ def write_photometric(
         _set(prim, "photometric:rule", types.String, surface.rule)
     if surface.source:
         _set(prim, "photometric:source", types.String, surface.source)
+    trust = confidence(surface.provenance, surface.rule, surface.source)
+    _set(prim, "photometric:confidence", types.Token, trust)
     if material.pbr is None:
         _set(prim, "legacy:specularColor", types.Color3f, Gf.Vec3f(*specular))
         _set(prim, "legacy:shininess", types.Float, material.shininess)

@@ -1,8 +1,14 @@
-"""Transforms and node animation as xform ops."""
+"""Transforms and node animation as xform ops.
+
+A USD stage has a range and does not repeat what is inside it: an animation that loops is
+written as often as it runs until the last one of the scene ends.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,16 +20,52 @@ from hdrusd.legacy.scene import TRS, Channel, Node
 _STEP = 1e-3
 
 
-def write_transform(prim: UsdGeom.Xformable, node: Node, codes_per_second: float) -> float | None:
-    """Author a node's transform; returns its last time code when it is animated."""
+#: Samples of one channel; one that loops is repeated no further.
+_MOST_SAMPLES = 100_000
+
+Doubles = npt.NDArray[np.float64]
+
+
+def last_key(nodes: Iterable[Node]) -> float:
+    """When the last animation of some nodes ends, those that loop once through, s."""
+    ends = (float(c.times[-1]) for node in nodes for c in node.animation if len(c.times))
+    return max(ends, default=0.0)
+
+
+def write_transform(
+    prim: UsdGeom.Xformable, node: Node, codes_per_second: float, end: float = 0.0
+) -> None:
+    """Author a node's transform; what loops is repeated until ``end``, s."""
     if node.animation:
-        trs = node.transform if isinstance(node.transform, TRS) else _decompose(node.transform)
-        return _animate(prim, trs, node.animation, codes_per_second)
+        _animate(prim, at_rest(node), node.animation, codes_per_second, end)
+        return
     if isinstance(node.transform, TRS):
         _static(prim, node.transform)
     elif node.transform is not None and not np.array_equal(node.transform, np.eye(4)):
         prim.AddTransformOp().Set(Gf.Matrix4d(np.asarray(node.transform, np.float64)))
-    return None
+
+
+def at_rest(node: Node) -> TRS:
+    """What an animated node has where no channel drives it."""
+    return node.transform if isinstance(node.transform, TRS) else _decompose(node.transform)
+
+
+def first_matrix(node: Node) -> Doubles:
+    """(4, 4), row vectors, of a node at the first keys of its animation."""
+    if not node.animation and not isinstance(node.transform, TRS):
+        return np.eye(4) if node.transform is None else np.asarray(node.transform, np.float64)
+    trs = at_rest(node)
+    values: dict[str, Any] = {
+        "translation": trs.translation,
+        "rotation": trs.rotation,
+        "scale": trs.scale,
+    }
+    values |= {c.path: tuple(c.values[0].tolist()) for c in node.animation if len(c.times)}
+    matrix = np.array(Gf.Matrix3d(_quaternion(values["rotation"])), np.float64)
+    made = np.eye(4)
+    made[:3, :3] = np.array(values["scale"])[:, None] * matrix
+    made[3, :3] = values["translation"]
+    return made
 
 
 def _static(prim: UsdGeom.Xformable, trs: TRS) -> None:
@@ -36,8 +78,8 @@ def _static(prim: UsdGeom.Xformable, trs: TRS) -> None:
 
 
 def _animate(
-    prim: UsdGeom.Xformable, trs: TRS, channels: tuple[Channel, ...], rate: float
-) -> float:
+    prim: UsdGeom.Xformable, trs: TRS, channels: tuple[Channel, ...], rate: float, end: float
+) -> None:
     ops = {
         "translation": prim.AddTranslateOp(),
         "rotation": prim.AddOrientOp(UsdGeom.XformOp.PrecisionDouble),
@@ -50,34 +92,131 @@ def _animate(
         ops["rotation"].Set(_quaternion(trs.rotation))
     if "scale" not in driven:
         ops["scale"].Set(Gf.Vec3d(*trs.scale))
-    last = 0.0
     for channel in channels:
-        values = channel.values
+        codes, values = samples(channel, rate, end)
+        op, turns = ops[channel.path], channel.path == "rotation"
+        for code, value in zip(codes.tolist(), values.tolist(), strict=True):
+            op.Set(_quaternion(value) if turns else Gf.Vec3d(*value), Usd.TimeCode(code))
+
+
+def samples(channel: Channel, rate: float, end: float) -> tuple[Doubles, Doubles]:
+    """Time codes (n,) and values (n, 3 or 4) that mean a channel when they are joined by lines.
+
+    A step holds the earlier value until just before the next; what loops goes on until
+    ``end``, s, or as far as ``repetitions`` says.
+    """
+    codes, values = np.round(channel.times * rate, 6), channel.values
+    if channel.interpolation == "step" and len(codes) > 1:
+        codes, values = _held(codes, values)
+    if channel.loop != "none" and len(codes) > 1:
+        codes, values = _repeated(codes, values, channel.loop, repetitions(channel, end))
+    if channel.path == "rotation":
+        values = _shortest_arcs(values)
+    return codes, values
+
+
+def pose(node: Node, codes: Doubles, rate: float, end: float) -> tuple[Doubles, Doubles, Doubles]:
+    """Translations (n, 3), rotations (n, 4) x y z w and scales (n, 3) of a node at time codes."""
+    trs, count = at_rest(node), len(codes)
+    found = {
+        "translation": np.tile(trs.translation, (count, 1)),
+        "rotation": np.tile(trs.rotation, (count, 1)),
+        "scale": np.tile(trs.scale, (count, 1)),
+    }
+    for channel in node.animation:
+        if not len(channel.times):
+            continue
+        keys, values = samples(channel, rate, end)
         if channel.path == "rotation":
-            values = _shortest_arcs(values)
-        for code, value in _samples(channel, values, rate):
-            ops[channel.path].Set(
-                _quaternion(value) if channel.path == "rotation" else Gf.Vec3d(*value),
-                Usd.TimeCode(code),
-            )
-            last = max(last, code)
-    return last
+            found["rotation"] = _turned(keys, values, codes)
+        else:
+            columns = [np.interp(codes, keys, column) for column in values.T]
+            found[channel.path] = np.stack(columns, axis=1)
+    turns = found["rotation"]
+    lengths = np.sqrt((turns * turns).sum(axis=1, keepdims=True))
+    none = np.array([0.0, 0.0, 0.0, 1.0])
+    turns = np.where(lengths > 0.0, turns / np.where(lengths > 0.0, lengths, 1.0), none)
+    return found["translation"], turns, found["scale"]
 
 
-def _samples(
-    channel: Channel, values: npt.NDArray[np.float64], rate: float
-) -> list[tuple[float, tuple[float, ...]]]:
-    """Time codes and values; a step holds the earlier value until just before the next."""
-    codes = channel.times * rate
-    samples: list[tuple[float, tuple[float, ...]]] = []
-    for index, (code, value) in enumerate(zip(codes, values, strict=True)):
-        if channel.interpolation == "step" and index:
-            held = tuple(float(v) for v in values[index - 1])
-            # Keys may lie closer than the step is wide.
-            step = min(_STEP, 0.5 * float(code - codes[index - 1]))
-            samples.append((float(code) - step, held))
-        samples.append((round(float(code), 6), tuple(float(v) for v in value)))
-    return samples
+def matrices(node: Node, codes: Doubles, rate: float, end: float) -> Doubles:
+    """(n, 4, 4), row vectors, of a node at time codes."""
+    if not node.animation:
+        return np.broadcast_to(first_matrix(node), (len(codes), 4, 4))
+    places, turns, scales = pose(node, codes, rate, end)
+    x, y, z, w = turns.T
+    made = np.zeros((len(codes), 4, 4))
+    made[:, 0, :3] = np.stack(
+        [w * w + x * x - y * y - z * z, 2 * (x * y + w * z), 2 * (x * z - w * y)], 1
+    )
+    made[:, 1, :3] = np.stack(
+        [2 * (x * y - w * z), w * w - x * x + y * y - z * z, 2 * (y * z + w * x)], 1
+    )
+    made[:, 2, :3] = np.stack(
+        [2 * (x * z + w * y), 2 * (y * z - w * x), w * w - x * x - y * y + z * z], 1
+    )
+    made[:, :3, :3] *= scales[:, :, None]
+    made[:, 3, :3], made[:, 3, 3] = places, 1.0
+    return made
+
+
+def _turned(keys: Doubles, values: Doubles, codes: Doubles) -> Doubles:
+    """(n, 4) on the arcs between quaternions at keys, held before the first and after the last."""
+    at = np.clip(codes, keys[0], keys[-1])
+    before = np.clip(np.searchsorted(keys, at, side="right") - 1, 0, max(len(keys) - 2, 0))
+    after = np.minimum(before + 1, len(keys) - 1)
+    gap = keys[after] - keys[before]
+    share = np.where(gap > 0.0, (at - keys[before]) / np.where(gap > 0.0, gap, 1.0), 0.0)
+    a, b = values[before], values[after]
+    angle = np.arccos(np.clip((a * b).sum(axis=1), -1.0, 1.0))
+    sine = np.sin(angle)
+    arc = sine > 1e-6
+    safe = np.where(arc, sine, 1.0)
+    left = np.where(arc, np.sin((1.0 - share) * angle) / safe, 1.0 - share)
+    right = np.where(arc, np.sin(share * angle) / safe, share)
+    return np.asarray(a * left[:, None] + b * right[:, None])
+
+
+def _held(codes: Doubles, values: Doubles) -> tuple[Doubles, Doubles]:
+    """Each value until just before the next."""
+    gaps = np.diff(codes)
+    times = np.empty(2 * len(codes) - 1)
+    times[0::2] = codes
+    times[1::2] = codes[1:] - np.minimum(_STEP, 0.5 * gaps)  # keys may lie closer than a step
+    held = np.empty((len(times), values.shape[1]))
+    held[0::2], held[1::2] = values, values[:-1]
+    return times, held
+
+
+def repetitions(channel: Channel, end: float) -> int:
+    """How often a channel that loops is written: until ``end``, s, and not too often."""
+    length = float(channel.times[-1] - channel.times[0]) if len(channel.times) else 0.0
+    if channel.loop == "none" or length <= 0.0:
+        return 1
+    each = len(channel.times) * (2 if channel.interpolation == "step" else 1)
+    times = max(math.ceil((end - float(channel.times[0])) / length - 1e-9), 1)
+    return min(times, max(_MOST_SAMPLES // each, 1))
+
+
+def _repeated(codes: Doubles, values: Doubles, loop: str, times: int) -> tuple[Doubles, Doubles]:
+    """A piece over and over; every second time backwards where it swings."""
+    length = codes[-1] - codes[0]
+    number = np.arange(times)
+    forth, back = codes - codes[0], (codes[-1] - codes)[::-1]
+    swings = loop == "swing"
+    offsets = np.where((number % 2 == 1)[:, None] & swings, back, forth)
+    all_codes = codes[0] + number[:, None] * length + offsets
+    order = np.arange(len(codes))
+    orders = np.where((number % 2 == 1)[:, None] & swings, order[::-1], order)
+    same = (values[0], -values[0]) if values.shape[1] == 4 else (values[0],)  # of quaternions
+    if not swings and not any(np.allclose(v, values[-1], rtol=0.0, atol=1e-9) for v in same):
+        # It jumps back: just before the next round it is still at its end.
+        all_codes[:-1, -1] -= np.minimum(_STEP, 0.5 * (codes[-1] - codes[-2]))
+        return all_codes.ravel(), values[orders].reshape(-1, values.shape[1])
+    # The end of a round is the beginning of the next.
+    kept = np.ones(all_codes.shape, np.bool_)
+    kept[1:, 0] = False
+    return all_codes[kept], values[orders[kept]]
 
 
 def _shortest_arcs(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -87,7 +226,7 @@ def _shortest_arcs(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return np.asarray(values * signs[:, None])
 
 
-def _quaternion(xyzw: tuple[float, ...]) -> Gf.Quatd:
+def _quaternion(xyzw: Sequence[float]) -> Gf.Quatd:
     x, y, z, w = (float(v) for v in xyzw)
     length = math.sqrt(x * x + y * y + z * z + w * w)
     if not length > 0.0:

@@ -9,58 +9,26 @@ street.geometry.usdc     nodes, meshes, cameras, bindings, animation
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, Vt
+from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom
 
-from hdrusd import report as findings
 from hdrusd.legacy import scene as legacy
 from hdrusd.photometry.light import PhotometricLight
 from hdrusd.report import Report
+from hdrusd.usd.ambient import write_ambient
 from hdrusd.usd.camera import write_camera
-from hdrusd.usd.fixtures import Lamp, PlacedMesh, find_fixtures, free_from
+from hdrusd.usd.fixtures import Lamp, PlacedMesh
+from hdrusd.usd.freed_lamps import free_lamps
 from hdrusd.usd.light import write_legacy_falloff, write_light
-from hdrusd.usd.material import bind, bind_faces, keep_extras
-from hdrusd.usd.mesh import write_mesh
+from hdrusd.usd.light_string import write_light_string
+from hdrusd.usd.material import keep_extras
+from hdrusd.usd.names import Names
 from hdrusd.usd.settings import Settings, write_settings
-from hdrusd.usd.transform import aim, is_flat, rigid, uniform_scale, write_transform
-
-#: Frame rate of the stages that we write; legacy animation is in seconds.
-CODES_PER_SECOND = 24.0
+from hdrusd.usd.transform import aim, is_flat, rigid, uniform_scale
+from hdrusd.usd.tree import CODES_PER_SECOND, PROTOTYPES, Place, TreeWriter, display_name
 
 LAYERS = ("photometry", "look", "geometry")
-
-_PROTOTYPES = Sdf.Path("/__Prototypes")
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Where a node of the source came to stand."""
-
-    node: legacy.Node
-    path: Sdf.Path
-
-
-@dataclass(slots=True)
-class Names:
-    """Valid and unique child names under each prim."""
-
-    taken: dict[Sdf.Path, set[str]] = field(default_factory=dict)
-
-    def child(self, parent: Sdf.Path, wanted: str) -> Sdf.Path:
-        """A free path below ``parent`` for a name from the source."""
-        names = self.taken.setdefault(parent, set())
-        wanted = wanted.strip()[:120] or "unnamed"
-        # A digit in front would be replaced, and "1st" and "2nd" be told apart no more.
-        base = Tf.MakeValidIdentifier(f"_{wanted}" if wanted[0].isdigit() else wanted)
-        name, number = base, 1
-        while name in names:
-            number += 1
-            name = f"{base}_{number}"
-        names.add(name)
-        return parent.AppendChild(name)
 
 
 class StageWriter:
@@ -86,10 +54,9 @@ class StageWriter:
         self.unit = source_unit / meters_per_unit  # scene units a source unit
         self.meters_per_unit = meters_per_unit
         top = Sdf.Path.absoluteRootPath
-        self.names = Names({top: {"Render", _PROTOTYPES.name}})
+        self.names = Names({top: {"Render", PROTOTYPES.name}})
         self.places: list[Place] = []
         self.meshes: list[PlacedMesh] = []
-        self.end: float | None = None
         self.first_camera: str | None = None
         root = Sdf.Layer.CreateNew(str(folder / f"{stem}.usda"))
         self.layers = {
@@ -107,7 +74,17 @@ class StageWriter:
         self.root = self.names.child(top, stem)
         self.looks = self.names.child(self.root, "Looks")
         self.materials = [self.names.child(self.looks, m.name) for m in scene.materials]
-        self._prototypes: dict[int, Sdf.Path] = {}
+        self.tree = TreeWriter(
+            self.stage,
+            self.layers["geometry"],
+            scene,
+            self.names,
+            self.root,
+            self.materials,
+            report,
+            unit=self.unit,
+            metres=source_unit,
+        )
 
     # -- geometry --------------------------------------------------------------------------
 
@@ -118,115 +95,33 @@ class StageWriter:
         if self.unit != 1.0:
             root.AddScaleOp(UsdGeom.XformOp.PrecisionDouble).Set(Gf.Vec3d(self.unit))
         UsdGeom.Scope.Define(self.stage, self.looks)
-        uses = self._mesh_uses()
-        stack = [(node, self.root, True) for node in reversed(self.scene.roots)]
-        while stack:
-            node, parent, shown = stack.pop()
-            path = self.names.child(parent, node.name)
-            self._write_node(node, path, uses, visible=shown and node.visible)
-            below = zip(node.children, self._shown_children(node), strict=True)
-            stack.extend((child, path, on) for child, on in reversed(list(below)))
+        self.tree.write()
+        self.places, self.meshes = self.tree.places, self.tree.meshes
+        shown = [path for path in self.tree.cameras if self.tree.is_shown(path)]
+        if shown:
+            self.first_camera = str(self.tree.copies.first(shown[0]))
         self._edit(None)
         prim = self.stage.GetPrimAtPath(self.root)
         self.stage.SetDefaultPrim(prim)
         Usd.ModelAPI(prim).SetKind(Kind.Tokens.component)
-        if self.end is not None:
+        if self.tree.animated:
             self.stage.SetTimeCodesPerSecond(CODES_PER_SECOND)
             self.stage.SetFramesPerSecond(CODES_PER_SECOND)
             self.stage.SetStartTimeCode(0.0)
-            self.stage.SetEndTimeCode(self.end)
-
-    def _mesh_uses(self) -> dict[int, int]:
-        """How many nodes use each mesh: what is used twice becomes a prototype."""
-        uses: dict[int, int] = {}
-        stack = list(self.scene.roots)
-        while stack:
-            node = stack.pop()
-            stack.extend(node.children)
-            for mesh in node.meshes:
-                uses[mesh] = uses.get(mesh, 0) + 1
-        return uses
-
-    def _write_node(
-        self, node: legacy.Node, path: Sdf.Path, uses: dict[int, int], *, visible: bool
-    ) -> None:
-        prim = UsdGeom.Xform.Define(self.stage, path)
-        self._display_name(prim.GetPrim(), node.name)
-        keep_extras(prim.GetPrim(), node.extras)
-        end = write_transform(prim, node, CODES_PER_SECOND)
-        if end is not None:
-            self.end = max(end, self.end or 0.0)
-        if any(channel.loop != "none" for channel in node.animation):
-            self._finding(
-                findings.Kind.REPLACED, "animation-loop", node, "looping animation is played once"
-            )
-        if not visible:
-            prim.CreateVisibilityAttr(UsdGeom.Tokens.invisible)
-        self.places.append(Place(node, path))
-        for index in node.meshes:
-            mesh = self.scene.meshes[index]
-            child = self.names.child(path, mesh.name)
-            self.meshes.append(PlacedMesh(child, path, index))
-            if uses[index] > 1:
-                self._instance(child, index)
-            else:
-                self._mesh(child, mesh)
-        for index in node.cameras:
-            camera = self.scene.cameras[index]
-            child = self.names.child(path, camera.name)
-            write_camera(self.stage, child, camera, unit=self.unit)
-            self.first_camera = self.first_camera or str(child)
-
-    def _shown_children(self, node: legacy.Node) -> list[bool]:
-        """Of levels of detail the finest stays visible, of switches what is on."""
-        count = len(node.children)
-        if node.kind == "lod" and len(node.lod_ranges) > 1:
-            text = f"{count} levels of detail; the nearest is shown at all distances"
-            self._finding(findings.Kind.REPLACED, "lod", node, text)
-            real = [low for low, high in node.lod_ranges if high > low]
-            nearest = min(real, default=0.0)
-            shown = [low == nearest and high > low for low, high in node.lod_ranges]
-        elif node.kind == "switch":
-            shown = list(node.switch_on)
-        elif node.kind == "sequence":
-            return [index == 0 for index in range(count)]
-        else:
-            shown = []
-        return [*shown, *[node.kind != "lod" or not shown] * count][:count]
-
-    def _mesh(self, path: Sdf.Path, mesh: legacy.Mesh) -> None:
-        prim = write_mesh(self.stage, path, mesh)
-        self._display_name(prim, mesh.name)
-        if mesh.material is not None:
-            bind(prim, self.materials[mesh.material])
-        for subset in mesh.subsets:
-            material = self.materials[subset.material]
-            name = self.names.child(path, material.name).name
-            faces = Vt.IntArray.FromNumpy(np.ascontiguousarray(subset.faces, np.int32))
-            bind_faces(UsdGeom.Mesh(prim), name, faces, material)
-
-    def _instance(self, path: Sdf.Path, index: int) -> None:
-        if index not in self._prototypes:
-            mesh = self.scene.meshes[index]
-            holder = self.names.child(_PROTOTYPES, mesh.name)
-            self.stage.CreateClassPrim(_PROTOTYPES)
-            UsdGeom.Xform.Define(self.stage, holder)
-            self._mesh(holder.AppendChild("Mesh"), mesh)
-            self._prototypes[index] = holder
-        prim = UsdGeom.Xform.Define(self.stage, path).GetPrim()
-        prim.GetReferences().AddInternalReference(self._prototypes[index])
-        prim.SetInstanceable(True)
+            self.stage.SetEndTimeCode(round(self.tree.end * CODES_PER_SECOND, 6))
 
     def write_node_camera(self, place: Place, camera: legacy.Camera) -> Sdf.Path:
-        """A camera at a node that the photometry file names."""
+        """A camera at a node that the photometry file names; where it first stands."""
         self._edit("geometry")
         path = self.names.child(place.path, camera.name)
         write_camera(self.stage, path, camera, unit=self.unit)
-        return path
+        return self.tree.copies.first(path)
 
     def set_visible(self, place: Place, *, visible: bool) -> None:
-        """Switch a node on or off in the photometry layer."""
+        """Switch a node on or off in the photometry layer; on: in a state that shows it."""
         self._edit("photometry")
+        if visible:
+            self.tree.show(place.path)
         prim = UsdGeom.Imageable(self.stage.GetPrimAtPath(place.path))
         token = UsdGeom.Tokens.inherited if visible else UsdGeom.Tokens.invisible
         prim.CreateVisibilityAttr(token)
@@ -250,18 +145,27 @@ class StageWriter:
         light: PhotometricLight,
         right: tuple[float, float, float] | None = None,
     ) -> Usd.Prim:
-        """A light at its node, into the photometry layer; ``right``: where its +X points, C = 0."""
+        """A light at its node, into the photometry layer; ``right``: where its +X points, C = 0.
+
+        Of a string of lamps the PointInstancer.
+        """
         self._edit("photometry")
         path = self.names.child(place.path, source.name)
-        node = UsdGeom.Xformable(self.stage.GetPrimAtPath(place.path))
+        # What is in a prototype is in the world where that stands.
+        first = self.tree.copies.first(place.path)
+        node = UsdGeom.Xformable(self.stage.GetPrimAtPath(first))
         # What is animated has no value at the default time.
         world = node.ComputeLocalToWorldTransform(Usd.TimeCode.EarliestTime())
-        scale, even = uniform_scale(world)
-        if not even:
-            scale = 1.0
-        prim = write_light(self.stage, path, light, scale=scale * self.meters_per_unit)
-        self._display_name(prim, source.name)
-        self._place_light(prim, source, world, even, right)
+        if source.positions is None:
+            scale, even = uniform_scale(world)
+            unit = (scale if even else 1.0) * self.meters_per_unit
+            prim = write_light(self.stage, path, light, scale=unit)
+            self._place_light(prim, source, world, even, right)
+        else:
+            prim = write_light_string(
+                self.stage, path, source, light, world, self.meters_per_unit, right
+            )
+        display_name(prim, source.name)
         write_legacy_falloff(prim, source.range, source.attenuation)
         keep_extras(prim, source.extras)
         prim.SetCustomDataByKey(
@@ -307,25 +211,20 @@ class StageWriter:
     def free_lamps(self, lamps: Sequence[Lamp]) -> None:
         """Find the fixtures of lamps, and leave them out of their shadows."""
         self._edit("photometry")
-        find_fixtures(self.stage, self.scene, self.meshes, lamps)
-        for lamp in lamps:
-            free_from(lamp.prim, lamp.fixtures)
+        free_lamps(self.stage, self.scene, self.tree, lamps)
 
     def write_ambient(self, light: PhotometricLight) -> Usd.Prim:
         """The sky: AmbientAPI on the default prim, and a dome that says the same to others."""
         self._edit("photometry")
         dome = write_light(self.stage, self.names.child(self.root, "Sky"), light)
         root = self.stage.GetPrimAtPath(self.root)
-        root.ApplyAPI("HdrusdAmbientAPI")
-        types = Sdf.ValueTypeNames
-        root.CreateAttribute("photometric:ambient:illuminance", types.Float, False).Set(
-            light.intensity
-        )
-        root.CreateAttribute("photometric:ambient:color", types.Color3f, False).Set(
-            Gf.Vec3f(*light.chromaticity)
-        )
-        root.CreateRelationship("photometric:ambient:light", False).SetTargets([dome.GetPath()])
+        write_ambient(root, light, dome.GetPath())
         return dome
+
+    def photometry_path(self, name: str) -> Sdf.Path:
+        """A free path below the root, for what the caller writes into the photometry layer next."""
+        self._edit("photometry")
+        return self.names.child(self.root, name)
 
     def write_settings(self, settings: Settings) -> None:
         """Camera, size and eye, into the root layer."""
@@ -333,13 +232,17 @@ class StageWriter:
         write_settings(self.stage, settings)
 
     def diagonal(self) -> float:
-        """Of the whole scene, m."""
+        """Of the whole scene in its selected states, m."""
+        session = Sdf.Layer.CreateAnonymous()
+        self.tree.select(session, session)
+        stage = Usd.Stage.Open(self.stage.GetRootLayer(), session)
         cache = UsdGeom.BBoxCache(Usd.TimeCode.EarliestTime(), [UsdGeom.Tokens.default_])
-        box = cache.ComputeWorldBound(self.stage.GetPseudoRoot()).ComputeAlignedRange()
+        box = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
         return 0.0 if box.IsEmpty() else float(box.GetSize().GetLength()) * self.meters_per_unit
 
     def save(self) -> None:
-        """Write all layers; the root, by which the rest is found, comes last. Raises OSError."""
+        """Select states and write all layers; the root, which names them, last. Raises OSError."""
+        self.tree.select(self.layers["geometry"], self.layers["photometry"])
         for layer in (*self.layers.values(), self.stage.GetRootLayer()):
             try:
                 saved = layer.Save()
@@ -351,10 +254,3 @@ class StageWriter:
     def _edit(self, layer: str | None) -> None:
         target = self.stage.GetRootLayer() if layer is None else self.layers[layer]
         self.stage.SetEditTarget(target)
-
-    def _display_name(self, prim: Usd.Prim, name: str) -> None:
-        if name and prim.GetName() != name:
-            prim.SetDisplayName(name[:200])
-
-    def _finding(self, kind: findings.Kind, code: str, node: legacy.Node, text: str) -> None:
-        self.report.add(kind, code, node.source, node.name, text)

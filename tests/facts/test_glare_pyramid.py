@@ -16,7 +16,6 @@ from hdrusd.glare.model import MODELS, GlareModel, angle
 from hdrusd.glare.pyramid import (
     EXCESS,
     NODES,
-    as_lamps,
     first_level,
     fitted,
     gaussians,
@@ -25,6 +24,7 @@ from hdrusd.glare.pyramid import (
     sigmas,
     weights,
 )
+from hdrusd.glare.splats import as_lamps
 from hdrusd.glare.veil import (
     directions,
     kernel,

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from hdrusd.errors import InputError
+from hdrusd.photometry.lamp_types import LAMP_TYPES
 from hdrusd.photometry.sidecar import Sidecar, read_sidecar
 from hdrusd.report import Kind, Report
 
@@ -36,6 +37,35 @@ lumens = 5600
 illuminant = "HP1"
 axis = [0, 0.1, -1]
 c0 = [-1, 0, 0]
+[[light]]
+match = "Bulb"
+lumens = 800
+spread = "lambert"
+axis = [0, 0, -1]
+[[light]]
+match = "Head"
+illuminance = 20
+distance = 25
+[[light]]
+match = "Lantern"
+watts = 70
+lamp = "high-pressure-sodium"
+[[light]]
+match = "Lantern2"
+watts = 70
+efficacy = 80.5
+[[light]]
+match = "Blender"
+radiant_watts = 10
+efficacy = 250
+[[material]]
+match = "Lens"
+candela = 700
+area = 0.02
+[[material]]
+match = "Panel"
+lumens = 700
+area = 0.5
 [[material]]
 match = "Glass"
 luminance = 12000
@@ -97,7 +127,11 @@ def test_every_key_is_known(tmp_path: Path) -> None:
     node = sidecar.match("node", "Debug")
     assert node is not None
     assert node.values["visible"] is False
-    assert str(material.place) == "photometry.toml:material[1]"
+    assert str(material.place) == "photometry.toml:material[3]"
+    lantern = sidecar.match("light", "Lantern")
+    assert lantern is not None
+    assert lantern.lamp is not None
+    assert (lantern.lamp.name, lantern.sp) == ("high-pressure-sodium", 0.56)
 
 
 def test_an_empty_file_says_nothing(tmp_path: Path) -> None:
@@ -132,6 +166,9 @@ def test_what_somebody_wrote_down_is_authored_unless_it_says_more(tmp_path: Path
         ("light", "color = [1, 1, -1]", "color"),
         ("light", "color = [0, 0, 0]", "color"),
         ("light", 'color = "red"', "color"),
+        ("light", "lumens = -1", "lumens"),
+        ("light", 'lamp = "sodium"', "lamp"),
+        ("light", "lamp = 3", "lamp"),
         ("light", "ies = 3", "ies"),
         ("light", "enabled = 1", "enabled"),
         ("light", "source = 1", "source"),
@@ -169,6 +206,70 @@ def test_a_wrong_value_beside_a_photometric_file(tmp_path: Path, line: str) -> N
     _, report = read(tmp_path, f'[[light]]\nmatch = "x"\nies = "a.ies"\n{line}\n')
     (finding,) = report
     assert (finding.code, finding.thing) == ("sidecar-invalid", line.split()[0])
+
+
+@pytest.mark.parametrize(
+    ("company", "line"),
+    [
+        ("lumens = 1", 'spread = "square"'),
+        ("illuminance = 1", "distance = 0"),
+        ('lamp = "led"', "watts = -1"),
+        ("watts = 1", "efficacy = 684"),
+        ("radiant_watts = 1", "efficacy = 0"),
+    ],
+)
+def test_a_wrong_value_beside_a_strength(tmp_path: Path, company: str, line: str) -> None:
+    _, report = read(tmp_path, f'[[light]]\nmatch = "x"\n{company}\n{line}\n')
+    assert ("sidecar-invalid", line.split()[0]) in {(f.code, f.thing) for f in report}
+
+
+def test_an_unknown_lamp_says_which_there_are(tmp_path: Path) -> None:
+    _, report = read(tmp_path, '[[light]]\nmatch = "x"\nwatts = 9\nlamp = "neon"\n')
+    texts = [finding.text for finding in report if finding.thing == "lamp"]
+    assert len(texts) == 1
+    for name in LAMP_TYPES:
+        assert name in texts[0]
+
+
+@pytest.mark.parametrize(
+    ("section", "lines", "rivals"),
+    [
+        ("light", ["candela = 1", "lumens = 1"], ["lumens"]),
+        ("light", ["candela = 1", "illuminance = 1", "distance = 2"], ["illuminance"]),
+        ("light", ["candela = 1", "illuminance = 1"], []),  # of a direction, and of a place
+        ("light", ["lumens = 1", "radiant_watts = 1"], ["radiant_watts"]),
+        ("light", ["lumens = 1", "watts = 1", 'lamp = "led"'], ["watts"]),
+        ("light", ['ies = "a"', "lumens = 1"], []),  # the luminaire's flux
+        ("light", ['ies = "a"', "watts = 1", "efficacy = 9"], ["watts"]),
+        ("light", ['ies = "a"', "lumens = 1", 'spread = "sphere"'], ["spread"]),
+        ("material", ["luminance = 1", "candela = 1"], ["candela"]),
+        ("material", ["candela = 1", "lumens = 1", "area = 1"], ["lumens"]),
+    ],
+)
+def test_of_two_that_say_one_thing_the_first_counts(
+    tmp_path: Path, section: str, lines: list[str], rivals: list[str]
+) -> None:
+    _, report = read(tmp_path, "\n".join([f"[[{section}]]", 'match = "x"', *lines]))
+    assert [f.thing for f in report if f.code == "sidecar-rival"] == rivals
+    assert report.codes() <= {"sidecar-rival"}
+
+
+@pytest.mark.parametrize(
+    ("text", "thing"),
+    [
+        ('[[light]]\nmatch = "a"\nwatts = 70', "watts"),
+        ('[[light]]\nmatch = "a"\ncandela = 1\nspread = "sphere"', "spread"),
+        ('[[light]]\nmatch = "a"\ndistance = 25', "distance"),
+        ('[[light]]\nmatch = "a"\ncandela = 1\nefficacy = 25', "efficacy"),
+        ('[[light]]\nmatch = "a"\ncandela = 1\naxis = [0, 0, 1]', "axis"),
+        ('[[material]]\nmatch = "a"\narea = 25', "area"),
+        ("[ambient]\nilluminance = 3\naltitude = 2", "altitude"),
+        ('[ambient]\npreset = "noon"\nilluminance = 1', "preset"),
+    ],
+)
+def test_what_says_nothing_alone(tmp_path: Path, text: str, thing: str) -> None:
+    _, report = read(tmp_path, text)
+    assert [(f.code, f.thing) for f in report] == [("sidecar-invalid", thing)]
 
 
 @pytest.mark.parametrize(

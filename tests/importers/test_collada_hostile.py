@@ -389,15 +389,26 @@ def test_the_skin_of_a_file_with_false_counts_is_in_place(testdata: Path) -> Non
     path = testdata / "data/assimp/invalid/box_nested_animation_4286.dae"
     report = Report()
     scene = read(Resolver(path, report), report)
-    assert {"collada-count", "skin"} <= report.codes()
+    assert {"collada-count", "collada-bind-shape"} <= report.codes()
     (armature,) = scene.roots
     bone, cube = armature.children
-    (shape,) = cube.children
-    place = np.eye(4)
-    for node in (shape, cube, armature):
-        if isinstance(node.transform, np.ndarray):
-            place = place @ node.transform
-    assert place[3, :3] == pytest.approx((0, 0, 1))
+    (skin,) = scene.skins
+    assert (cube.skin, skin.joints) == (0, (bone,))
+    assert scene.meshes[0].joint_weights.tolist() == [[1.0]] * 8
+    # The joint at rest, as its matrix says before the animation.
+    joint = np.array(
+        [
+            [0.7886751, -0.5773503, -0.211325, 0],
+            [0.2113248, 0.5773503, -0.7886751, 0],
+            [0.5773503, 0.5773503, 0.5773502, 0],
+            [0, 0, 0, 1],
+        ]
+    ).T
+    place = skin.inverse_binds[0] @ joint @ armature.transform
+    # The numbers of the file have seven digits.
+    assert place == pytest.approx(
+        np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 1, 1]]), abs=1e-6
+    )
     assert bone.animation
     assert bone.animation[0].times[0] == pytest.approx(0.04166662)
     assert len(bone.animation[0].times) == 40

@@ -263,14 +263,15 @@ def test_a_switch_shows_what_its_mask_has(tmp_path: Path) -> None:
     """Bit 0 is the first child; faces count too. Mask 1 of two has the second and third."""
     pool = Pool()
     switch = node(96, "s", 36, {16: struct.pack(">3I2I", 1, 2, 1, 0, 0b110)})
+    name = record(132, struct.pack(">I", 1) + b"by night\0")
     children = inside(group("a"), group("b"), face(pool.square()), face(pool.square(1.0)))
-    made = load(tmp_path, database(switch + children, vertices=pool.data))
+    made = load(tmp_path, database(switch + name + children, vertices=pool.data))
     own = made.node("s")
-    assert (own.kind, own.switch_on) == ("switch", (False, True))
-    assert len(own.meshes) == 1
-    hidden = own.children[2]
-    assert (hidden.visible, len(hidden.meshes)) == (False, 1)
-    assert made.report.codes() == {"flt-switch-masks"}
+    assert (own.kind, own.switch_on) == ("switch", (False, True, True, False))
+    assert own.switch_masks == (("mask0", (False,) * 4), ("by night", own.switch_on))
+    assert [len(child.meshes) for child in own.children] == [0, 0, 1, 1]
+    assert all(child.visible for child in own.children)
+    assert not made.report.codes()
 
 
 def test_a_switch_whose_mask_is_not_there(tmp_path: Path) -> None:

@@ -205,14 +205,17 @@ def test_declared_sizes_cost_nothing(tmp_path: Path) -> None:
     assert peak < 20e6
 
 
-def test_memory_of_many_light_points_is_bounded(tmp_path: Path) -> None:
-    """A point is named by 4 bytes, and its note is many times as large."""
+def test_light_points_beyond_a_limit_are_dropped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A point is named by 4 bytes, and its lamp is many times as large."""
+    monkeypatch.setattr("hdrusd.importers.flt_light_points.MOST_POINTS", 100_000)
     pool = Pool()
     (corner,) = pool.add(vertex((0, 0, 0)))
     points = node(111, "p", 156) + inside(*[record(72, struct.pack(">I", corner) * 16_000)] * 20)
     made = load(tmp_path, database(points, vertices=pool.data))
-    assert len(made.node("p").extras["light_points"]) == 100_000
-    assert "320000 of colour" in made.finding("flt-light-points").text
+    assert made.scene.counts()["light_points"] == 100_000
+    assert made.finding("light-point-limit").text.startswith("320000 light points, 100000 of them")
 
 
 def test_many_small_meshes_take_time_in_proportion(tmp_path: Path) -> None:

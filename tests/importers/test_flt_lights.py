@@ -1,11 +1,10 @@
-"""OpenFlight lights: sources with their palette, light points as notes."""
+"""OpenFlight lights: sources with their palette, light points as strings of lamps."""
 
 from __future__ import annotations
 
 import math
 import struct
 from pathlib import Path
-from typing import Any
 
 import pytest
 from flt_builder import (
@@ -27,6 +26,8 @@ from flt_builder import (
 from hdrusd.conversion import Options
 from hdrusd.convert import convert
 from hdrusd.importers.flt_lights import direction
+from hdrusd.importers.light_points import lobe_cone
+from hdrusd.legacy.scene import Light
 from hdrusd.report import Kind
 
 
@@ -130,83 +131,132 @@ def look(
 NIGHT, DAY, FLASHING = 0x4000, 0x10000, 0x400000
 
 
-def notes(made: Loaded, name: str) -> tuple[dict[str, Any], ...]:
-    """The light points noted at a node."""
-    return tuple(made.node(name).extras["light_points"])
+def lamps(made: Loaded, name: str) -> list[Light]:
+    """The strings of lamps at a node."""
+    return [made.scene.lights[number] for number in made.node(name).lights]
 
 
-def two(pool: Pool) -> bytes:
+def two(pool: Pool, normal: tuple[float, ...] | None = None) -> bytes:
     """A vertex list of a red point and one without colour."""
-    corners = pool.add(vertex((1, 2, 3), packed=(255, 0, 0)), vertex((4, 5, 6)))
+    corners = pool.add(
+        vertex((1, 2, 3), normal, packed=(255, 0, 0)),
+        vertex((4, 5, 6), normal),
+    )
     return inside(record(72, struct.pack(">2I", *corners)))
 
 
-def test_light_points_are_notes(tmp_path: Path) -> None:
+def test_light_points_are_lamps(tmp_path: Path) -> None:
+    """One for each colour and each way; the back has the colour that index -1 is, white."""
     pool = Pool()
     fields = look(12, front=0.4, back=0.2, size=0.5, way=2, flags_at=140, flags=NIGHT | FLASHING)
-    own = node(111, "studs", 156, fields) + two(pool)
+    own = node(111, "studs", 156, fields) + two(pool, (0, -2, 0))
     made = load(tmp_path, database(own, vertices=pool.data))
-    assert notes(made, "studs") == (
-        {
-            "on": True,
-            "position": (1, 2, 3),
-            "color": (1, 0, 0, 1),
-            "intensity": pytest.approx(0.4),
-            "radius": 0.25,
-        },
-        {
-            "on": True,
-            "position": (4, 5, 6),
-            "color": (1, 1, 1, 1),
-            "intensity": pytest.approx(0.4),
-            "radius": 0.25,
-        },
+    red, white, back = lamps(made, "studs")
+    assert [light.name for light in (red, white, back)] == ["studs", "studs", "studs_back"]
+    assert [light.kind for light in (red, white, back)] == ["spot"] * 3
+    assert red.positions is not None
+    assert white.positions is not None
+    assert back.positions is not None
+    assert (red.positions.tolist(), white.positions.tolist()) == ([[1, 2, 3]], [[4, 5, 6]])
+    assert back.positions.tolist() == [[1, 2, 3], [4, 5, 6]]
+    assert (red.diffuse, white.diffuse, back.diffuse) == (
+        pytest.approx((0.4, 0, 0)),
+        pytest.approx((0.4,) * 3),
+        pytest.approx((0.2,) * 3),
     )
-    assert made.node("studs").extras["light_point_look"] == {
+    assert (red.direction, red.directions, red.radius, red.enabled) == (
+        (0, -1, 0),
+        None,
+        0.25,
+        True,
+    )
+    assert back.direction == (0, 1, 0)
+    assert red.spot_cutoff == back.spot_cutoff == lobe_cone(30.0, 10.0)
+    assert red.extras == {
+        "color": (1, 0, 0),
+        "intensity": pytest.approx(0.4),
+        "radius": 0.25,
         "directionality": "bidirectional",
         "visible": ["night"],
         "lobe_degrees": (60.0, 20.0, 5.0),
         "back_intensity": pytest.approx(0.2),
-        "back_color": (1.0, 1.0, 1.0),
         "animation": "flashing",
     }
-    assert made.finding("flt-light-points").kind is Kind.DROPPED
-    assert (made.scene.meshes, made.scene.lights) == ([], [])
+    assert made.report.codes() == {"light-point-lobe", "light-point-animation"}
+    assert made.scene.counts() == {
+        "meshes": 0, "triangles": 0, "materials": 0, "textures": 0, "lights": 0, "cameras": 0,
+        "light_points": 4,
+    }  # fmt: skip
+
+
+def test_beams_without_a_normal_shine_to_all_sides(tmp_path: Path) -> None:
+    pool = Pool()
+    fields = look(12, front=1, back=1, size=0, way=2, flags_at=140, flags=0)
+    own = node(111, "p", 156, fields) + two(pool)
+    made = load(tmp_path, database(own, vertices=pool.data))
+    assert [(light.kind, light.lamps, light.radius) for light in lamps(made, "p")] == [
+        ("point", 1, None)
+    ] * 2
+    assert made.finding("light-point-beam").text.startswith("2 beams")
+
+
+def test_beams_go_each_its_own_way(tmp_path: Path) -> None:
+    pool = Pool()
+    fields = look(12, front=1, back=0, size=1, way=1, flags_at=140, flags=0)
+    corners = pool.add(vertex((0, 0, 0), (1, 0, 0)), vertex((1, 0, 0), (0, 0, 1)))
+    own = node(111, "p", 156, fields) + inside(record(72, struct.pack(">2I", *corners)))
+    (light,) = lamps(load(tmp_path, database(own, vertices=pool.data)), "p")
+    assert light.directions is not None
+    assert light.directions.tolist() == [[1, 0, 0], [0, 0, 1]]
 
 
 def test_points_that_are_not_there_at_night_are_off(tmp_path: Path) -> None:
     pool = Pool()
     fields = look(12, front=1, back=0, size=1, way=0, flags_at=140, flags=DAY)
     made = load(tmp_path, database(node(111, "p", 156, fields) + two(pool), vertices=pool.data))
-    assert [point["on"] for point in notes(made, "p")] == [False, False]
+    assert [light.enabled for light in lamps(made, "p")] == [False, False]
+
+
+@pytest.mark.parametrize(("flags", "on"), [(0x80000000, True), (0, False)])
+def test_a_light_point_system_dims_and_switches(tmp_path: Path, flags: int, on: bool) -> None:
+    pool = Pool()
+    fields = look(12, front=0.5, back=0, size=1, way=0, flags_at=140, flags=0)
+    system = node(131, "s", 24, {12: struct.pack(">fiI", 0.5, 0, flags)})
+    own = system + inside(node(111, "p", 156, fields) + two(pool))
+    made = load(tmp_path, database(own, vertices=pool.data))
+    assert [(light.enabled, light.diffuse) for light in lamps(made, "p")] == [
+        (on, (0.25, 0, 0)),
+        (on, (0.25, 0.25, 0.25)),
+    ]
 
 
 def test_indexed_light_points(tmp_path: Path) -> None:
-    """Record 130 names an appearance (128) and an animation (129)."""
+    """Record 130 names an appearance (128), after which lamps are called, and an animation."""
     pool = Pool()
     fields = look(268, front=0.7, back=0, size=2.0, way=1, flags_at=380, flags=0)
     fields[264] = struct.pack(">i", 5)
+    fields[8] = b"edge"
     appearance = node(128, "", 412, fields)
     animation = record(129, bytes(4) + text("blink", 256) + struct.pack(">i", 6), 1380)
     animation = animation[:268] + struct.pack(">f", 1.5) + animation[272:]
     animation = animation[:296] + struct.pack(">i", 2) + animation[300:]
-    own = node(130, "p", 28, {12: struct.pack(">2i", 5, 6)}) + two(pool)
+    own = node(130, "p", 28, {12: struct.pack(">2i", 5, 6)}) + two(pool, (0, 0, 1))
     made = load(tmp_path, database(own, palettes=appearance + animation, vertices=pool.data))
-    assert [point["intensity"] for point in notes(made, "p")] == pytest.approx([0.7, 0.7])
-    assert made.node("p").extras["light_point_look"] == {
-        "directionality": "unidirectional",
-        "visible": [],
-        "lobe_degrees": (60.0, 20.0, 5.0),
-        "animation": "strobe",
-        "period_s": 1.5,
-    }
+    found = lamps(made, "p")
+    assert [(light.name, light.extras["intensity"]) for light in found] == [
+        ("edge", pytest.approx(0.7))
+    ] * 2
+    assert (found[0].extras["animation"], found[0].extras["period_s"]) == ("strobe", 1.5)
     lost = load(tmp_path, database(own, vertices=pool.data))
     assert "appearance 5 is not in the palette" in lost.finding("flt-palette-entry").text
+    assert [light.name for light in lamps(lost, "p")] == ["p", "p"]
 
 
 def test_faces_drawn_as_lights(tmp_path: Path) -> None:
     pool = Pool()
     own = thing("o", face(pool.square(), draw=8))
     made = load(tmp_path, database(own, vertices=pool.data))
-    assert [point["position"] for point in notes(made, "o")][2] == (1.0, 1.0, 0.0)
+    (light,) = lamps(made, "o")
+    assert light.positions is not None
+    assert light.positions[2].tolist() == [1.0, 1.0, 0.0]
     assert made.scene.meshes == []

@@ -25,7 +25,7 @@ from flt_builder import (
 from hdrusd.errors import InputError
 from hdrusd.importers.importer import Resolver
 from hdrusd.importers.importer import read as read_any
-from hdrusd.legacy.scene import TRS, LegacyScene, Node
+from hdrusd.legacy.scene import TRS, LegacyScene, Light, Node
 from hdrusd.report import Kind, Report
 
 # --- instances ----------------------------------------------------------------------------
@@ -161,6 +161,12 @@ def test_real_files(testdata: Path) -> None:
     assert (texture.wrap_s, texture.image.missing) == ("mirror", False)  # as its .attr says
 
 
+def split(scene: LegacyScene) -> tuple[list[Light], list[Light]]:
+    """The strings of lamps of a scene, and its light sources."""
+    points = [light for light in scene.lights if light.positions is not None]
+    return points, [light for light in scene.lights if light.positions is None]
+
+
 def test_the_night_street_is_that_of_openscenegraph(testdata: Path) -> None:
     """The same street, written by osgconv from this file: points, lights, colours, look."""
     data = testdata / "data"
@@ -172,7 +178,9 @@ def test_the_night_street_is_that_of_openscenegraph(testdata: Path) -> None:
     twin, _ = read_real(other)
     assert scene.counts() == twin.counts() | {"meshes": 14}
     assert {m.name for m in scene.materials} == {"asphalt", "paint", "steel", "sodium"}
-    for mine, theirs in zip(scene.lights, twin.lights, strict=True):
+    points, sources = split(scene)
+    other_points, other_sources = split(twin)
+    for mine, theirs in zip(sources, other_sources, strict=True):
         assert (mine.kind, mine.spot_cutoff, mine.spot_exponent) == ("spot", 70.0, 2.0)
         assert mine.diffuse == pytest.approx(theirs.diffuse, abs=1e-6)
         assert mine.attenuation == theirs.attenuation
@@ -188,8 +196,15 @@ def test_the_night_street_is_that_of_openscenegraph(testdata: Path) -> None:
     while nodes:
         found.append(nodes.pop())
         nodes += found[-1].children
-    points = {n.name: n.extras["light_points"] for n in found if "light_points" in n.extras}
-    assert {name: len(each) for name, each in points.items()} == {"lamps": 6, "studs": 22}
+    assert {light.name: light.lamps for light in points} == {"lamps": 6, "studs": 22}
+    for mine, theirs in zip(points, other_points, strict=True):
+        np.testing.assert_allclose(mine.positions, theirs.positions, atol=1e-4)
+        assert (mine.name, mine.kind) == (theirs.name, theirs.kind)
+        assert mine.direction == pytest.approx(theirs.direction, abs=1e-6)
+        # Colours of 8 bits as text, angles in degrees as radians of 6 digits.
+        assert mine.diffuse == pytest.approx(theirs.diffuse, abs=1e-5)
+        assert mine.spot_cutoff == pytest.approx(theirs.spot_cutoff, rel=1e-5)
+        assert mine.radius == pytest.approx(theirs.radius, rel=1e-6)
     assert sum(n.extras.get("not_at") == ("day",) for n in found) == 6
 
 

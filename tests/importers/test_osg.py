@@ -56,7 +56,7 @@ def test_drawables_may_be_children_and_may_be_hidden(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("syntax", ["new", "old"])
-def test_a_shared_node_is_repeated_and_its_mesh_is_not(tmp_path: Path, syntax: str) -> None:
+def test_a_shared_node_is_one_node_in_two_places(tmp_path: Path, syntax: str) -> None:
     if syntax == "new":
         text = scene(geode(geometry(), fields="UniqueID 3 "), "osg::Geode {\nUniqueID 3 \n}")
     else:
@@ -64,8 +64,21 @@ def test_a_shared_node_is_repeated_and_its_mesh_is_not(tmp_path: Path, syntax: s
     made = load(tmp_path, text)
     one, two = made.root.children
     assert (one.meshes, two.meshes, len(made.scene.meshes)) == ([0], [0], 1)
-    assert one is not two
+    assert one is two
     assert not made.codes()
+
+
+def test_a_shared_node_below_another_state_is_another_node(tmp_path: Path) -> None:
+    culled = "StateSet TRUE {\nosg::StateSet {\nModeList 1 {\nGL_CULL_FACE ON\n}\n}\n}\n"
+    shared = geode(geometry(), fields="UniqueID 3 ")
+    other = group("osg::Geode {\nUniqueID 3 \n}", fields=culled)
+    made = load(tmp_path, scene(shared, other))
+    one, two = made.root.children
+    assert one is not two.children[0]
+    assert [made.scene.meshes[n.meshes[0]].two_sided for n in (one, two.children[0])] == [
+        True,
+        False,
+    ]
 
 
 @pytest.mark.parametrize(
@@ -160,7 +173,7 @@ def test_switches(tmp_path: Path, values: str) -> None:
         text = old_group(*[old_group()] * 3, kind="Switch", fields=fields)
     made = load(tmp_path, text)
     assert (made.root.kind, made.root.switch_on) == ("switch", (True, False, True))
-    assert [child.visible for child in made.root.children] == [True, False, True]
+    assert all(child.visible for child in made.root.children)
 
 
 def test_a_multi_switch_shows_its_active_set(tmp_path: Path) -> None:
@@ -169,7 +182,9 @@ def test_a_multi_switch_shows_its_active_set(tmp_path: Path) -> None:
     made = load(
         tmp_path, HEADER + group(group(), group(), kind="osgSim::MultiSwitch", fields=fields)
     )
-    assert (made.root.switch_on, made.codes()) == ((False, True), {"osg-switch-sets"})
+    masks = (("set0", (True, False)), ("set1", (False, True)))
+    assert (made.root.switch_on, made.root.switch_masks) == ((False, True), masks)
+    assert not made.codes()
     old = "ActiveSwitchSet 1\nValueList 0 {\n1\n0\n}\nValueList 1 {\n0\n1\n}"
     text = old_group(old_group(), old_group(), kind="osgSim::MultiSwitch", fields=old)
     assert load(tmp_path, text).root.switch_on == (False, True)
@@ -177,7 +192,7 @@ def test_a_multi_switch_shows_its_active_set(tmp_path: Path) -> None:
 
 def test_the_first_of_a_sequence_is_shown(tmp_path: Path) -> None:
     made = load(tmp_path, HEADER + group(group(), group(), kind="osg::Sequence"))
-    assert [child.visible for child in made.root.children] == [True, False]
+    assert all(child.visible for child in made.root.children)
     assert (made.root.kind, made.codes()) == ("sequence", {"osg-sequence"})
 
 
@@ -207,36 +222,6 @@ def test_callbacks_and_user_data_are_said(tmp_path: Path) -> None:
         f"UserDataContainer TRUE {{\n{udc}\n}}"
     )
     assert load(tmp_path, scene(fields=fields)).codes() == {"osg-callback", "osg-user-data"}
-
-
-@pytest.mark.parametrize("syntax", ["new", "old"])
-def test_light_points_are_noted(tmp_path: Path, syntax: str) -> None:
-    if syntax == "new":
-        points = (
-            "LightPointList 2 {\nLightPoint {\nPosition 1 2 3 \nColor 1 0.5 0 1 \n"
-            "Attributes TRUE 1 0.4 0.05 \nSector FALSE BlinkSequence FALSE }\nLightPoint {\n"
-            "Position 4 5 6 \nColor 1 0.5 0 1 \nAttributes FALSE 0 1 2 \nSector TRUE {\n"
-            "osgSim::DirectionalSector {\nDirection 0 -1 0 \n}\n}\nBlinkSequence FALSE }\n}"
-        )
-        text = scene(f'osgSim::LightPointNode {{\nName "studs" \n{points}\n}}')
-    else:
-        body = "".join(
-            f"lightPoint {{\nisOn {on}\nposition {p}\ncolor 1 0.5 0 1\nintensity {i}\n"
-            f"radius {r}\n}}\n"
-            for on, p, i, r in (("TRUE", "1 2 3", 0.4, 0.05), ("FALSE", "4 5 6", 1, 2))
-        )
-        text = old_group(f'osgSim::LightPointNode {{\nname "studs"\nnum_lightpoints 2\n{body}}}')
-    made = load(tmp_path, text)
-    one, two = made.node("studs").extras["light_points"]
-    assert (one["on"], one["position"], one["intensity"], one["radius"]) == (
-        True,
-        (1, 2, 3),
-        0.4,
-        0.05,
-    )
-    assert (two["on"], two["color"]) == (False, (1, 0.5, 0, 1))
-    text = made.finding("osg-light-points").text
-    assert "2 of colour (1, 0.5, 0, 1)" in text
 
 
 def test_cameras(tmp_path: Path) -> None:
@@ -294,7 +279,7 @@ def test_shared_files_have_the_counts_of_their_manifest(
 
 def test_the_lamps_of_the_night_street(testdata: Path) -> None:
     made = shared(testdata, "derived-osg/night_street.osgt")
-    lamps = made.scene.lights
+    lamps = [lamp for lamp in made.scene.lights if lamp.positions is None]
     assert {lamp.kind for lamp in lamps} == {"spot"}
     # data/synthetic: lamps 7.9 m high every 20 m, at 5 m to either side in turn
     assert [lamp.position for lamp in lamps] == [
@@ -305,8 +290,7 @@ def test_the_lamps_of_the_night_street(testdata: Path) -> None:
     }
     heads = [m for m in made.scene.materials if m.name == "sodium"]
     assert [(m.lit, m.emission) for m in heads] == [(False, (1.0, 0.84, 0.6))]
-    points = [len(node.extras.get("light_points", ())) for node in made.nodes()]
-    assert sorted(points)[-2:] == [6, 22]
+    assert [light.lamps for light in made.scene.lights if light.positions is not None] == [6, 22]
 
 
 def test_the_lamp_post_has_its_texture_on_unit_1(testdata: Path) -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from pxr import Gf, Usd, UsdGeom
 
 from hdrusd.legacy.scene import TRS, Channel
-from hdrusd.usd.transform import aim, is_flat, rigid, uniform_scale, write_transform
+from hdrusd.usd.transform import aim, is_flat, last_key, rigid, uniform_scale, write_transform
 
 RATE = 24.0
 NUMBERS = st.floats(-10.0, 10.0).map(lambda v: round(v, 3))
@@ -25,9 +25,12 @@ QUATERNIONS = (
 )
 
 
-def written(transform: Any = None, *channels: Channel) -> tuple[UsdGeom.Xform, float | None]:
+def written(transform: Any = None, *channels: Channel) -> tuple[UsdGeom.Xform, float]:
     form = UsdGeom.Xform.Define(new_stage(), "/Node")
-    return form, write_transform(form, node(transform=transform, animation=channels), RATE)
+    made = node(transform=transform, animation=channels)
+    end = last_key([made])
+    write_transform(form, made, RATE, end)
+    return form, end * RATE
 
 
 def matrix(form: UsdGeom.Xform, code: float | None = None) -> np.ndarray:
@@ -64,7 +67,7 @@ def test_scale_then_rotate_then_translate(t: Any, q: Any, s: Any) -> None:
     wanted[:3, :3] = np.diag(s) @ rotation(q)
     wanted[3, :3] = t
     assert matrix(form) == pytest.approx(wanted, abs=1e-12)
-    assert end is None
+    assert end == 0.0
 
 
 def test_a_matrix_is_kept_as_it_is() -> None:

@@ -1,0 +1,68 @@
+"""``hdrusd recipe``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from hdrusd.errors import HdrusdError
+
+from .options import FILE, FOLDER, tell
+
+
+@click.group("recipe")
+def command() -> None:
+    """Write a first photometry file, by what a database holds."""
+
+
+@command.command("init")
+@click.argument("source", type=FILE)
+@click.argument("output", type=click.Path(path_type=Path, allow_dash=True), required=False)
+@click.option(
+    "--root",
+    "roots",
+    type=FOLDER,
+    multiple=True,
+    help="Folder below which the source may name files; its own always counts.",
+)
+@click.option(
+    "--search-path",
+    "search",
+    type=FOLDER,
+    multiple=True,
+    help="Folder where missing textures are looked for.",
+)
+@click.option("--overwrite", is_flag=True, help="Replace OUTPUT where it exists.")
+@click.option("-q", "--quiet", is_flag=True, help="No findings on the terminal.")
+def init(
+    source: Path,
+    output: Path | None,
+    roots: tuple[Path, ...],
+    search: tuple[Path, ...],
+    overwrite: bool,
+    quiet: bool,
+) -> None:
+    """Propose photometry for the lamps of SOURCE, as OUTPUT [photometry.toml beside it; - prints].
+
+    Lamps are found by lights and light points, glowing materials, names, and bright spots in
+    textures; numbers are typical of each class, with its range and source. What is only
+    suspected is commented out. Edit it, then: hdrusd convert SOURCE STAGE.usda
+    """
+    from hdrusd.photometry.sidecar import FILE_NAME
+    from hdrusd.recipe.making import write_recipe
+    from hdrusd.report import Report
+
+    output = source.parent / FILE_NAME if output is None else output
+    printed = str(output) == "-"
+    if not printed and output.is_dir():
+        raise click.UsageError(f"{output}: a folder; want the name of a file")
+    if not printed and output.exists() and not overwrite:
+        raise HdrusdError(f"{output}: exists; want another OUTPUT, or --overwrite")
+    report = Report()
+    found = write_recipe(source, None if printed else output, report, roots, search)
+    if printed:
+        click.echo(found.text, nl=False)
+    tell(report, quiet)
+    if not printed:
+        click.echo(f"{output}: {found.entries} entries, {found.suspicions} suspicions")

@@ -1,0 +1,135 @@
+"""Every picture that a source names, and the class of what it is used for.
+
+Only pictures of reflectance and emission go through T^gamma; the rest stays as it is. What no
+material uses is listed too, by the notes that a reader left in ``extras``: an unused picture
+that is called an emission map is a lamp that stays dark.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+from hdrusd.legacy.scene import Material, Texture
+from hdrusd.photometry.albedo import words
+from hdrusd.usd.material import Surface
+
+#: The classes, best first where a picture has several uses.
+CLASSES = ("reflectance", "emission", "opacity", "data", "lookup", "unused")
+
+#: Fields of a material with textures, by class; what is in any other field is data.
+_FIELDS = {"diffuse_map": "reflectance", "emission_map": "emission", "opacity_map": "opacity"}
+
+#: Words of names by which an unused picture shows what it was meant for.
+_MEANT = {
+    "emission": "emission emissive emit emis glow illum illumination selfillum night ke",
+    "data": "normal normals norm nrm nm bump disp displacement height parallax spec specular gloss"
+    " rough roughness metal metallic metalness ao occlusion orm mask refl reflection pm pr ps ks ns"
+    " shininess",
+    "lookup": "lut ramp gradient toon env envmap spheremap cubemap sphere cube",
+}
+
+_PICTURE = re.compile(r"\.(png|jpe?g|tga|bmp|dds|tiff?|rgba?|sgi|int|inta|gif|exr|hdr|webp|ktx2?)$")
+
+#: Nested notes that are looked through, and names that are taken from one material.
+_DEPTH, _MOST = 4, 64
+
+
+def image_rows(
+    materials: Sequence[Material],
+    surfaces: Sequence[Surface],
+    areas: Sequence[float],
+    written: Mapping[str, Mapping[str, object]],
+) -> list[dict[str, Any]]:
+    """A row for each picture by name. ``areas``: m2 that wear each material; ``written``: the
+    files of the conversion and the image that each was made from.
+    """
+    rows: dict[str, dict[str, Any]] = {}
+    total = sum(areas)
+    for material, surface, area in zip(materials, surfaces, areas, strict=True):
+        share = area / total if total > 0.0 else 0.0
+        for name, texture in _textures(material):
+            row = _row(rows, texture.image.name, str(texture.image.source))
+            row["uses"].add(_use(name, surface))
+            row["missing"] |= texture.image.missing
+            if material.name not in row["materials"]:
+                row["materials"].append(material.name)
+                row["share"] += share
+    for material in materials:
+        for key, name in _noted(material.extras):
+            if name not in rows:
+                row = _row(rows, name, str(material.source))
+                row["meant"] = _meant(key, name)
+                row["materials"].append(material.name)
+    for file, made in written.items():
+        if made.get("image") in rows:
+            rows[str(made["image"])]["files"].append(file)
+    for row in rows.values():
+        uses = row.pop("uses")
+        row["class"] = next((c for c in CLASSES if c in uses), "unused")
+        row["also"] = [c for c in CLASSES if c in uses and c != row["class"]]
+    return list(rows.values())
+
+
+def _row(rows: dict[str, dict[str, Any]], name: str, place: str) -> dict[str, Any]:
+    empty: dict[str, Any] = {
+        "name": name,
+        "place": place,
+        "uses": set(),
+        "meant": None,
+        "missing": False,
+        "materials": [],
+        "share": 0.0,
+        "files": [],
+    }
+    return rows.setdefault(name, empty)
+
+
+def _textures(material: Material) -> Iterator[tuple[str, Texture]]:
+    """Every field of a material that holds a texture."""
+    for field in fields(material):
+        value = getattr(material, field.name)
+        if isinstance(value, Texture):
+            yield field.name, value
+
+
+def _use(name: str, surface: Surface) -> str:
+    """What a field's texture is used for; the glass of a lamp reflects nothing."""
+    use = _FIELDS.get(name, "data")
+    if use == "reflectance" and surface.replaces_reflection:
+        return "emission" if surface.emission_map is not None else "unused"
+    if use == "emission" and not any(surface.emission):
+        return "unused"
+    return use
+
+
+def _noted(extras: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """(key, name) of pictures that a reader noted without using them."""
+    found: list[tuple[str, str]] = []
+    stack: list[tuple[str, Any, int]] = [("", extras, 0)]
+    while stack and len(found) < _MOST:
+        key, value, depth = stack.pop()
+        if isinstance(value, str):
+            found += [(key, word) for word in _names(value)]
+        elif isinstance(value, Mapping) and depth < _DEPTH:
+            stack += [(f"{key} {k}", v, depth + 1) for k, v in value.items()]
+        elif isinstance(value, (list, tuple)) and depth < _DEPTH:
+            stack += [(key, v, depth + 1) for v in value[:_MOST]]
+    return found
+
+
+def _names(text: str) -> list[str]:
+    """A picture's name: the whole text, else its last word, as behind MTL's options."""
+    text = text.strip()
+    if len(text) > 400 or not _PICTURE.search(text.lower()):
+        return []
+    return [text.split()[-1]] if text.startswith("-") else [text]
+
+
+def _meant(key: str, name: str) -> str | None:
+    """The class that a name, or the word by which it is noted, speaks of."""
+    stem = name.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
+    found = set(words(stem)) | set(words(key))
+    return next((use for use, said in _MEANT.items() if found & set(said.split())), None)

@@ -1,0 +1,105 @@
+"""The account of a conversion as plain text for a terminal: no longer than a screen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from textwrap import wrap
+from typing import Any
+
+from hdrusd.account.lights import FACTOR, group_name, grouped
+from hdrusd.errors import one_line
+
+#: Rows of lights and entries of what to fix that are shown; the report has all.
+LIGHTS, ENTRIES = 8, 5
+
+#: Columns below which and above which a line is not set.
+_NARROWEST, _WIDEST = 60, 120
+
+_MORE = "--report FILE has all"
+
+
+def summary(document: Mapping[str, Any], columns: int) -> list[str]:
+    """Lines of at most ``columns`` characters (60 to 120). ``document``: ``Result.as_dict``."""
+    width = min(max(columns, _NARROWEST), _WIDEST)
+    lines = [
+        *_lights(document["lights"], document["totals"], width),
+        *_surfaces(document["totals"]),
+        *_fixes(document["fix_first"], width),
+    ]
+    return [_cut(line, width) for line in lines]
+
+
+def _lights(
+    rows: Sequence[Mapping[str, Any]], totals: Mapping[str, Any], width: int
+) -> Iterator[str]:
+    if not rows:
+        yield "lights: none"
+        return
+    lumens = totals["flux_lm"]
+    trust = ", ".join(f"{n} {c}" for c, n in totals["lamps_by_confidence"].items())
+    flux = "" if lumens is None else f", {lumens:.4g} lm"
+    yield f"lights: {totals['lamps']}{flux}; confidence: {trust}"
+    groups = sorted(grouped(rows), key=_strength, reverse=True)
+    cells = [("", "source says", "rule", "result", "confidence"), *map(_cells, groups[:LIGHTS])]
+    widths = [max(len(row[i]) for row in cells) for i in range(5)]
+    # What is too wide loses in its names and rules, which the report has in full.
+    for column in (2, 0, 1):
+        over = sum(widths) + 2 * 5 - width
+        widths[column] = max(min(widths[column], 12), widths[column] - max(over, 0))
+    for row in cells:
+        parts = (f"{_cut(cell, n):<{n}}" for cell, n in zip(row, widths, strict=True))
+        yield f"  {'  '.join(parts)}".rstrip()
+    if len(groups) > LIGHTS:
+        yield f"  and {sum(map(len, groups[LIGHTS:]))} more; {_MORE}"
+
+
+def _strength(group: Sequence[Mapping[str, Any]]) -> float:
+    return float(sum((row["flux_lm"] or row["value"]) * row["lamps"] for row in group))
+
+
+def _cells(group: Sequence[Mapping[str, Any]]) -> tuple[str, str, str, str, str]:
+    row = group[0]
+    lamps = sum(r["lamps"] for r in group)
+    name = one_line(group_name(group)) + (f" ({lamps})" if lamps > 1 else "")
+    said = row["source_value"]
+    if said is None:
+        source = ""
+    elif said["unit"] == "colour":
+        source = f"colour {' '.join(f'{c:.3g}' for c in said['diffuse'])}"
+    else:
+        source = f"{said['value']:.4g} {said['unit']}"
+    unit = "x" if row["unit"] == FACTOR else row["unit"]
+    is_now = f"{row['value']:.4g} {unit}"
+    if row["unit"] == FACTOR and row["flux_lm"] is not None:
+        is_now = f"{row['flux_lm']:.4g} lm by file"
+    return name, source, one_line(row["rule"] or row["provenance"]), is_now, row["confidence"]
+
+
+def _surfaces(totals: Mapping[str, Any]) -> Iterator[str]:
+    classes = ", ".join(f"{n} {c}" for c, n in totals["textures_by_class"].items())
+    lost = totals["textures_missing"]
+    missing = f" ({lost} missing)" if lost else ""
+    yield f"textures: {classes or 'none'}{missing}"
+    yield (
+        f"reflectances: {totals['materials_judged']} of {totals['materials']} materials judged, "
+        f"{totals['materials_doubted']} doubted"
+    )
+
+
+def _fixes(entries: Sequence[Mapping[str, Any]], width: int) -> Iterator[str]:
+    if not entries:
+        return
+    yield "what to fix first:"
+    for entry in entries[:ENTRIES]:
+        yield _cut(f"  {entry['rank']}. {one_line(entry['what'])}", width)
+        yield from (f"     {line}" for line in wrap(one_line(entry["why"]), width - 5)[:2])
+        if entry["write"]:
+            head, _, body = entry["write"].partition("\n")
+            told = f"{entry['where']}: {head} {', '.join(body.splitlines())}".rstrip()
+            yield from (f"     {line}" for line in wrap(one_line(told), width - 5)[:2])
+    if len(entries) > ENTRIES:
+        yield f"  and {len(entries) - ENTRIES} more; {_MORE}"
+
+
+def _cut(text: str, width: int) -> str:
+    return text if len(text) <= width else f"{text[: width - 3]}..."

@@ -1,0 +1,325 @@
+"""The lights of a stage that is converted: candela and lux over its UsdLux inputs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from pxr import Sdf, Usd, UsdGeom
+
+from hdrusd.account.lights import light_row
+from hdrusd.errors import SourceRef
+from hdrusd.lamps import temperature_rgb
+from hdrusd.legacy import scene as legacy
+from hdrusd.luminaires import LuminaireFiles
+from hdrusd.photometry.interpret import Interpreter, LuminaireFile, rule_color
+from hdrusd.photometry.light import PhotometricLight
+from hdrusd.photometry.light_unit import CONSTANTS, LIGHT_UNITS
+from hdrusd.photometry.sidecar import Rule, Sidecar
+from hdrusd.report import Kind, Report
+from hdrusd.skies import Sky, SkyFiles
+from hdrusd.usd import ambient, light, light_overs
+from hdrusd.usd.light_overs import (
+    NO_SHAPING,
+    SourceLight,
+    read_source_light,
+    shaping,
+    write_light_over,
+)
+from hdrusd.usd.lux import input_source, normalized, photometric_file
+from hdrusd.usd.names import unique
+from hdrusd.usd.overs import Overs
+from hdrusd.usd.preset_sky import write_sky_dome, write_sky_sun
+from hdrusd.usd.source_stage import source_layer
+
+#: Lumens of a lamp by its candela on the axis: 4 pi of a ball, pi of a matt face, pi^2 of a tube.
+_FLUX = {"sphere": 4.0 * math.pi, "disk": math.pi, "rect": math.pi, "cylinder": math.pi**2}
+
+#: Lights whose shape alone sends more forward than aside.
+_FACES = ("disk", "rect", "cylinder")
+
+#: Keys of a light's rule that state all its light.
+_FLUXES = frozenset({"lumens", "watts", "radiant_watts"})
+
+#: Keys of a light's rule that turn or free a lamp, which a stage says itself.
+_UNUSED = ("axis", "c0", "fixture_shadow")
+
+_EARLIEST = Usd.TimeCode.EarliestTime()
+
+
+class LightOverlay:
+    """Writes lights over those of a stage; ``rows`` is the account of them."""
+
+    def __init__(
+        self,
+        overs: Overs,
+        interpreter: Interpreter,
+        sidecar: Sidecar,
+        luminaires: LuminaireFiles,
+        skies: SkyFiles,
+        report: Report,
+    ) -> None:
+        self.overs = overs
+        self.stage = overs.stage
+        self.interpreter = interpreter
+        self.sidecar = sidecar
+        self.luminaires = luminaires
+        self.skies = skies
+        self.report = report
+        self.unit = LIGHT_UNITS[sidecar.light_unit]
+        self.file = Path(source_layer(self.stage).realPath)
+        self.sky = sidecar.ambient if not ambient.has_ambient(self.stage) else None
+        self.rows: list[dict[str, Any]] = []
+        self._done: set[str] = set()
+        self._photometric = 0
+
+    def write(self, prim: Usd.Prim, places: list[Usd.Prim]) -> None:
+        """One light, once for every place in the layer."""
+        place = str(self.overs.place(prim))
+        if place in self._done:
+            return
+        self._done.add(place)
+        names = [prim.GetName(), prim.GetDisplayName(), prim.GetParent().GetName()]
+        rule = self.sidecar.match("light", *names, *(str(p.GetPath()) for p in places[:1]))
+        if light_overs.is_photometric(prim):
+            self._photometric += 1
+            made = light.read_light(prim)
+            self.rows.append(light_row(prim.GetName(), str(prim.GetPath()), made))
+            return
+        source = read_source_light(prim, places)
+        if source is None or not source.sound:
+            text = "no closed form" if source is None else "a strength that is no number"
+            self._note(prim, Kind.REPLACED, "usd-light-kept", f"{text}; kept as it is")
+            return
+        if source.kind == "dome" and self.sky is not None:
+            text = f"{self.sky.place} says the sky; hidden"
+            self._note(prim, Kind.REPLACED, "ambient-replaced", text)
+            self._hide(prim)
+            return
+        self._note_unused(prim, rule)
+        source = self._in_unit(source)
+        file = self._luminaire(source, rule)
+        meaning = self._meaning(source, rule, file)
+        if meaning is None:
+            self._hide(prim)
+            return
+        radius = None if rule is None else rule.number("radius")
+        if not source.alike and not meaning.profile:
+            text = "copies of different size; their candela stay with the nits"
+            self._note(prim, Kind.ASSUMED, "usd-light-copies", text)
+        write_light_over(self.overs, source, meaning, radius=radius)
+        self._account(source, meaning, file, places)
+
+    def write_sky(self) -> None:
+        """The sky of the photometry file, where it states one and the stage has not."""
+        rule, root = self.sky, self.stage.GetDefaultPrim()
+        if rule is None:
+            return
+        if not root:
+            text = "a sky needs a defaultPrim to stand on; not used"
+            self.report.add(Kind.DROPPED, "usd-rule-unused", rule.place, "ambient", text)
+            return
+        color = rule_color(rule, temperature_rgb)
+        made = self.skies.make(rule, color) if "preset" in rule.values else _plain_sky(rule, color)
+        if made is None:
+            return
+        # The layer alone, so that what is written does not change the stage that is read.
+        top = Sdf.Layer.CreateAnonymous()
+        top.pseudoRoot.SetInfo("upAxis", UsdGeom.GetStageUpAxis(self.stage))
+        top.subLayerPaths.append(self.overs.layer.identifier)
+        alone = Usd.Stage.Open(top)
+        alone.SetEditTarget(self.overs.layer)
+        path = self._free(root, "Sky")
+        if made.picture:
+            dome = write_sky_dome(alone, path, made.light, made.picture)
+            UsdGeom.Xformable(dome).SetResetXformStack(True)  # north is not the default prim's
+        else:
+            light.write_light(alone, path, made.light)
+            ambient.write_ambient(alone.OverridePrim(root.GetPath()), made.light, path)
+        self.rows.append(light_row(path.name, str(path), made.light))
+        if made.sun is not None:
+            path = self._free(root, "Sun")
+            sun = write_sky_sun(alone, path, made.sun, made.towards)
+            UsdGeom.Xformable(sun).SetResetXformStack(True)
+            self.rows.append(light_row(path.name, str(path), made.sun))
+
+    def _free(self, root: Usd.Prim, name: str) -> Sdf.Path:
+        """A path below the default prim where the stage has nothing."""
+        taken = set(root.GetAllChildrenNames())
+        return root.GetPath().AppendChild(unique(name, taken))
+
+    def note_kept(self) -> None:
+        """A finding for what is photometric already."""
+        if self._photometric:
+            text = f"{self._photometric} lights are photometric already; left alone"
+            self.report.add(Kind.ASSUMED, "usd-photometric", SourceRef(self.file), "", text)
+        if self.sidecar.ambient is not None and self.sky is None:
+            text = "the stage states its sky already; left alone"
+            place = self.sidecar.ambient.place
+            self.report.add(Kind.DROPPED, "usd-rule-unused", place, "ambient", text)
+
+    # -- one light -------------------------------------------------------------------------
+
+    def _in_unit(self, source: SourceLight) -> SourceLight:
+        """The light with its strength in candela or lux by the unit that is asked for."""
+        prim, unit = source.prim, self.unit
+        distant = source.kind == "distant"
+        if unit.name != "nits" and source.kind != "dome" and not normalized(prim, _EARLIEST):
+            text = f"{unit.name} go with normalize 1; read as nits"
+            self._note(prim, Kind.ASSUMED, "usd-light-unit", text)
+            return source
+        factor = unit.distant if distant else unit.local
+        moments = {
+            time: replace(m, strength=m.strength * factor) for time, m in source.moments.items()
+        }
+        return replace(source, moments=moments)
+
+    def _luminaire(self, source: SourceLight, rule: Rule | None) -> LuminaireFile | None:
+        if rule is None or "ies" not in rule.values or source.kind in ("distant", "dome"):
+            return None
+        return self.luminaires.use(str(rule.values["ies"]), rule.place)
+
+    def _meaning(
+        self, source: SourceLight, rule: Rule | None, file: LuminaireFile | None
+    ) -> PhotometricLight | None:
+        """The light in photometric terms; None where it is off."""
+        prim, top = source.prim, source.brightest
+        if source.kind == "dome" and (rule is None or not self._plain_dome(prim, rule)):
+            self._note_letter(source)
+            return self._letter(PhotometricLight("ambient", top.strength, top.color))
+        if rule is None and top.strength == 0.0:
+            return self._letter(PhotometricLight("point", 0.0, top.color))
+        if rule is not None and source.kind in ("disk", "rect") and "spread" not in rule.values:
+            rule = replace(rule, values={**rule.values, "spread": "lambert"})
+        made = self.interpreter.light(self._asked(source), rule, file)
+        if made is None:
+            return None
+        if made.rule == "source file":
+            self._note_letter(source)
+            made = self._letter(made)
+        if source.kind in _FACES and shaping(prim) == NO_SHAPING:
+            # What a rule's spread says of a ball, a face or a tube has by its shape.
+            made = replace(made, kind="point", cutoff=180.0, softness=0.0, exponent=0.0)
+        own = photometric_file(prim)
+        if own and not made.profile and source.kind not in ("distant", "dome"):
+            made = replace(made, profile=own)
+        if source.kind == "cylinder" and rule is not None and _FLUXES & rule.values.keys():
+            # A tube's lumens go out over pi^2 of its candela, and no spread of a rule is that.
+            made = replace(made, intensity=made.intensity * _FLUX["sphere"] / _FLUX["cylinder"])
+        return made
+
+    def _letter(self, made: PhotometricLight) -> PhotometricLight:
+        return replace(made, provenance="authored", rule=self.unit.text, source="")
+
+    def _asked(self, source: SourceLight) -> legacy.Light:
+        """The light as the other formats hand it to the interpreter."""
+        top, prim = source.brightest, source.prim
+        kinds = {"distant": "directional", "dome": "ambient"}
+        local = source.kind not in kinds
+        cutoff, softness, exponent = shaping(prim) if local else NO_SHAPING
+        return legacy.Light(
+            name=prim.GetName(),
+            source=SourceRef(self.file, str(prim.GetPath())),
+            kind=kinds.get(source.kind, "point"),  # type: ignore[arg-type]
+            diffuse=top.color,
+            specular=top.color,
+            candela=top.strength if local else None,
+            lux=None if local else top.strength,
+            spot_cutoff=cutoff,
+            spot_inner=cutoff * (1.0 - softness) if 0.0 < softness <= 1.0 else None,
+            spot_exponent=exponent,
+            radius=min(max(source.radius, 1e-3), 10.0) if local else None,
+        )
+
+    def _note_unused(self, prim: Usd.Prim, rule: Rule | None) -> None:
+        for key in _UNUSED:
+            if rule is not None and key in rule.values:
+                text = f"{key} is not used: the stage says how the lamp stands and what it shades"
+                self.report.add(Kind.DROPPED, "usd-rule-unused", rule.place, prim.GetName(), text)
+
+    def _plain_dome(self, prim: Usd.Prim, rule: Rule) -> bool:
+        """Whether a rule's illuminance can be a dome's: not of one with a picture."""
+        if "illuminance" not in rule.values:
+            return "enabled" in rule.values
+        if light_overs.pictured(prim):
+            text = f"{rule.place}: a dome with a picture takes no illuminance"
+            self._note(prim, Kind.INVALID, "sidecar-unit", text)
+            return False
+        return True
+
+    def _note_letter(self, source: SourceLight) -> None:
+        """What the number rests on, and what else it may be."""
+        prim, strength = source.prim, source.brightest.strength
+        unit = "lx" if source.kind in ("distant", "dome") else "cd"
+        text = f"{strength:.4g} {unit} by the letter of UsdLux 25.05"
+        if self.unit.name != "nits":
+            text = f"{strength:.4g} {unit} by light_unit {self.unit.name}"
+        self._note(prim, Kind.ASSUMED, "usd-light-unit", text)
+        if self.unit.name != "nits":
+            return
+        stated = input_source(prim, "intensity")
+        specs = stated.GetPropertyStack(_EARLIEST) if stated else []
+        writer = str(specs[0].layer.documentation) if specs else ""
+        if writer.startswith("Blender") and (source.kind == "dome" or normalized(prim, _EARLIEST)):
+            right = LIGHT_UNITS["blender-watts"]
+            factor = right.distant if source.kind == "distant" else right.local
+            text = (
+                f"{writer} writes watts; {strength * factor:.4g} {unit} with "
+                '[usd] light_unit = "blender-watts" in the photometry file'
+            )
+            self._note(prim, Kind.ASSUMED, "usd-light-writer", text)
+        elif specs and stated.Get(_EARLIEST) in CONSTANTS.get(source.kind, ()):
+            text = (
+                f"intensity {stated.Get(_EARLIEST):g} is what NVIDIA's converter writes for every "
+                f"{source.kind} light; want [[light]] candela or illuminance in the photometry file"
+            )
+            self._note(prim, Kind.ASSUMED, "usd-light-writer", text)
+
+    def _hide(self, prim: Usd.Prim) -> None:
+        self.overs.value(prim, "visibility", Sdf.ValueTypeNames.Token, "invisible")
+
+    def _account(
+        self,
+        source: SourceLight,
+        made: PhotometricLight,
+        file: LuminaireFile | None,
+        places: list[Usd.Prim],
+    ) -> None:
+        prim = source.prim
+        flux = None if file is None else made.intensity * file.luminaire.flux()
+        row = light_row(
+            prim.GetName(),
+            str(places[0].GetPath()),
+            replace(made, radius=source.radius) if source.radius > 0.0 else made,
+            self._asked(source),
+            place=str(SourceRef(self.file, str(prim.GetPath()))),
+            file_flux=flux,
+        )
+        row["lamps"] = len(places)
+        if source.kind in _FLUX and not made.profile:
+            per_nit = source.brightest.per_nit
+            row["luminance_cd_m2"] = made.intensity / per_nit if per_nit > 0.0 else None
+            if made.kind == "point":
+                row["flux_lm"] = made.intensity * _FLUX[source.kind]
+            elif source.kind != "sphere":
+                row["flux_lm"] = None
+        self.rows.append(row)
+
+    def _note(self, prim: Usd.Prim, kind: Kind, code: str, text: str) -> None:
+        self.report.add(kind, code, SourceRef(self.file), str(prim.GetPath()), text)
+
+
+def _plain_sky(rule: Rule, color: legacy.RGB | None) -> Sky:
+    """Light from everywhere alike."""
+    return Sky(
+        PhotometricLight(
+            "ambient",
+            rule.number("illuminance") or 0.0,
+            color or (1.0, 1.0, 1.0),
+            provenance=rule.provenance,
+            rule=str(rule.place),
+            source=rule.source,
+        )
+    )

@@ -1,0 +1,68 @@
+"""A database in, a first photometry file out: ``write_recipe``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hdrusd.errors import InputError
+from hdrusd.images import read_image, write_atomically
+from hdrusd.importers.importer import Resolver, read
+from hdrusd.legacy.scene import Image
+from hdrusd.photometry.reflectance import reflectance_table
+from hdrusd.recipe.evidence import leads
+from hdrusd.recipe.places import Doubles
+from hdrusd.recipe.text import recipe
+from hdrusd.report import Report
+from hdrusd.units import TEXTURE_GAMMA
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """The text, and how many of its entries count and how many are commented out."""
+
+    text: str
+    entries: int
+    suspicions: int
+
+
+def write_recipe(
+    source: Path,
+    output: Path | None,
+    report: Report,
+    roots: Sequence[Path] = (),
+    search: Sequence[Path] = (),
+) -> Recipe:
+    """Read ``source``, write ``output`` (None: do not). Raises InputError."""
+    scene = read(Resolver(source, report, roots, search), report)
+    found = leads(scene, _picture)
+    counted = sum(lead.counts for lead in found)
+    text = recipe(source.name, found)
+    if output is not None:
+        write_atomically(output, lambda path: _write(path, text))
+    return Recipe(text, counted + 1, len(found) - counted)
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+def _picture(image: Image) -> Doubles | None:
+    """8-bit pictures in linear values; others hold no painted lamps."""
+    if image.missing:
+        return None
+    pixels: npt.NDArray[Any] | None = image.pixels
+    if pixels is None:
+        try:
+            pixels = read_image(image.path or Path(image.name), image.data).pixels
+        except InputError:  # convert tells it
+            return None
+    if pixels.dtype != "uint8":
+        return None
+    color = pixels[..., :3] if pixels.shape[2] >= 3 else pixels[..., :1].repeat(3, axis=2)
+    return np.asarray(reflectance_table(TEXTURE_GAMMA, 1.0)[color])

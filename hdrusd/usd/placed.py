@@ -1,0 +1,40 @@
+"""How large what a scene shows stands on the stage: meshes, and the ground below all of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from pxr import Gf, Usd, UsdGeom
+
+from hdrusd.usd.fixtures import PlacedMesh
+from hdrusd.usd.sharing import Copies
+
+
+def area_scales(stage: Usd.Stage, placed: Iterable[PlacedMesh], copies: Copies) -> dict[int, float]:
+    """m2 a square unit of each mesh, summed over all its visible places, at the first time.
+
+    The square of the cube root of the volume's scale: exact where a scale is even.
+    """
+    time, unit = Usd.TimeCode.EarliestTime(), UsdGeom.GetStageMetersPerUnit(stage)
+    cache = UsdGeom.XformCache(time)
+    found: dict[int, float] = {}
+    places = ((one.mesh, path) for one in placed for path in copies.places(one.path))
+    for mesh, path in places:
+        prim = stage.GetPrimAtPath(path)
+        hidden = UsdGeom.Imageable(prim).ComputeVisibility(time) == UsdGeom.Tokens.invisible
+        volume = abs(cache.GetLocalToWorldTransform(prim).GetDeterminant3())
+        scale = 0.0 if hidden else (float(np.cbrt(volume)) * unit) ** 2
+        found[mesh] = found.get(mesh, 0.0) + scale
+    return found
+
+
+def footprint(stage: Usd.Stage) -> float:
+    """m2 of ground below the bounding box of all that is visible, at the first time."""
+    cache = UsdGeom.BBoxCache(Usd.TimeCode.EarliestTime(), [UsdGeom.Tokens.default_])
+    box = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
+    if box.IsEmpty():
+        return 0.0
+    size: Gf.Vec3d = box.GetSize() * UsdGeom.GetStageMetersPerUnit(stage)
+    up = 1 if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.y else 2
+    return float(np.prod([size[axis] for axis in range(3) if axis != up]))

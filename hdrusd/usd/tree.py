@@ -1,0 +1,313 @@
+"""The nodes of a LegacyScene as prims: transforms, meshes, cameras, prototypes, states, skins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from pxr import Sdf, Usd, UsdGeom, Vt
+
+from hdrusd.legacy.scene import LegacyScene, Mesh, Node
+from hdrusd.report import Kind, Report
+from hdrusd.usd.camera import write_camera
+from hdrusd.usd.fixtures import PlacedMesh
+from hdrusd.usd.material import bind, bind_faces, keep_extras
+from hdrusd.usd.mesh import write_mesh
+from hdrusd.usd.names import Names
+from hdrusd.usd.sharing import Copies, every_node, shared_nodes
+from hdrusd.usd.skeleton import Skeletons
+from hdrusd.usd.states import MOST, States, select, states_of, write_states
+from hdrusd.usd.transform import last_key, repetitions, write_transform
+
+#: Frame rate of the stages that we write; legacy animation is in seconds.
+CODES_PER_SECOND = 24.0
+
+PROTOTYPES = Sdf.Path("/__Prototypes")
+
+#: Opinions that the variants of a whole scene may take.
+_MOST_OPINIONS = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A node of the source and where it is written: in all its places, if in a prototype."""
+
+    node: Node
+    path: Sdf.Path
+
+
+@dataclass(slots=True)
+class _Choice:
+    """The states of a prim, and which of them is selected."""
+
+    states: States
+    selected: int
+    children: list[Sdf.Path] = field(default_factory=list)
+
+
+class TreeWriter:
+    """Writes the nodes of a scene below ``root`` into ``layer``, the stage's edit target.
+
+    ``unit``: scene units a source unit; ``metres``: a source unit.
+    """
+
+    def __init__(
+        self,
+        stage: Usd.Stage,
+        layer: Sdf.Layer,
+        scene: LegacyScene,
+        names: Names,
+        root: Sdf.Path,
+        materials: Sequence[Sdf.Path],
+        report: Report,
+        *,
+        unit: float,
+        metres: float,
+    ) -> None:
+        self.stage = stage
+        self.layer = layer
+        self.scene = scene
+        self.names = names
+        self.root = root
+        self.materials = materials
+        self.report = report
+        self.unit = unit
+        self.metres = metres
+        self.places: list[Place] = []
+        self.meshes: list[PlacedMesh] = []
+        self.cameras: list[Sdf.Path] = []
+        self.copies = Copies(PROTOTYPES)
+        nodes = list(every_node(scene.roots))
+        self.animated = any(node.animation for node in nodes)
+        self.end = last_key(nodes)  # s
+        self._choices: dict[Sdf.Path, _Choice] = {}
+        self._opinions = 0
+        self._skeletons = Skeletons(scene, report, CODES_PER_SECOND, self.end)
+        self._shared = shared_nodes(scene.roots, self._skeletons.pinned)
+        self._prototypes: dict[int, Sdf.Path] = {}  # of nodes, by id
+        self._mesh_prototypes: dict[int, Sdf.Path] = {}  # by number
+        self._uses: dict[int, int] = {}
+
+    def write(self) -> None:
+        """All of it. Until something is selected all states are composed at once."""
+        self._uses = self._mesh_uses()
+        stack = self._entered(self.scene.roots, self.root, [True] * len(self.scene.roots))
+        while stack:
+            node, path, shown = stack.pop()
+            if id(node) in self._shared:
+                UsdGeom.Xform.Define(self.stage, path)
+                if not shown:
+                    UsdGeom.Imageable(self.stage.GetPrimAtPath(path)).MakeInvisible()
+                known = self._prototypes.get(id(node))
+                if known is not None:
+                    self.copies.add(path, known)
+                    continue
+                prototype = self._new_prototype(node.name)
+                self._prototypes[id(node)] = prototype
+                self.copies.add(path, prototype)
+                path, shown = prototype, True
+            self._write_node(node, path, visible=shown and node.visible)
+            below = self._entered(self._children(node), path, self._shown(node, path))
+            if path in self._choices:
+                self._choices[path].children = [child for _, child, _ in reversed(below)]
+            stack += below
+        # At the end: what is added to a prototype afterwards is added to each of its places.
+        with Sdf.ChangeBlock():
+            for use, prototype in self.copies.instances.items():
+                spec = self.layer.GetPrimAtPath(use)
+                spec.referenceList.Prepend(Sdf.Reference("", prototype))
+                spec.instanceable = True
+            for path, choice in self._choices.items():
+                write_states(self.layer, path, choice.states, choice.children, self.metres)
+
+    def _entered(
+        self, nodes: Sequence[Node], parent: Sdf.Path, shown: Sequence[bool]
+    ) -> list[tuple[Node, Sdf.Path, bool]]:
+        """Nodes with their paths, the first one last."""
+        named = [self.names.child(parent, node.name) for node in nodes]
+        return list(zip(nodes, named, shown, strict=True))[::-1]
+
+    def _children(self, node: Node) -> list[Node]:
+        """The children that become prims: joints on which nothing hangs do not."""
+        if node.kind in ("lod", "switch", "sequence"):
+            return node.children
+        return [child for child in node.children if id(child) not in self._skeletons.bare]
+
+    def _mesh_uses(self) -> dict[int, int]:
+        """In how many places each mesh is written: what is in two becomes a prototype."""
+        uses: dict[int, int] = {}
+        met: set[int] = set()
+        stack = list(self.scene.roots)
+        while stack:
+            node = stack.pop()
+            if id(node) in self._shared:
+                if id(node) in met:
+                    continue
+                met.add(id(node))
+            stack.extend(node.children)
+            for mesh in node.meshes:
+                if not self._bent(node, mesh):
+                    uses[mesh] = uses.get(mesh, 0) + 1
+        return uses
+
+    def _bent(self, node: Node, mesh: int) -> bool:
+        return id(node) in self._skeletons.bones and self._skeletons.bends(mesh)
+
+    # -- one node --------------------------------------------------------------------------
+
+    def _write_node(self, node: Node, path: Sdf.Path, *, visible: bool) -> None:
+        form = UsdGeom.Xform.Define(self.stage, path)
+        prim = form.GetPrim()
+        display_name(prim, node.name)
+        keep_extras(prim, node.extras)
+        write_transform(form, node, CODES_PER_SECOND, self.end)
+        self._note_loops(node)
+        if not visible:
+            form.CreateVisibilityAttr(UsdGeom.Tokens.invisible)
+        self.places.append(Place(node, path))
+        bent = [index for index in node.meshes if self._bent(node, index)]
+        for index in node.meshes:
+            if index in bent:
+                continue
+            mesh = self.scene.meshes[index]
+            child = self.names.child(path, mesh.name)
+            self.meshes.append(PlacedMesh(child, path, index))
+            if self._uses[index] > 1:
+                self._instance(child, index)
+            else:
+                self._mesh(child, mesh)
+        if bent:
+            self._skinned(node, path, bent)
+        for index in node.cameras:
+            camera = self.scene.cameras[index]
+            child = self.names.child(path, camera.name)
+            write_camera(self.stage, child, camera, unit=self.unit)
+            self.cameras.append(child)
+
+    def _note_loops(self, node: Node) -> None:
+        loops = [channel for channel in node.animation if channel.loop != "none"]
+        if loops:
+            times = min(repetitions(channel, self.end) for channel in loops)
+            text = (
+                f"loops for ever; written {times} times over for the stage, which ends at "
+                f"{self.end:g} s"
+            )
+            self._finding(Kind.REPLACED, "animation-loop", node, text)
+
+    def _mesh(self, path: Sdf.Path, mesh: Mesh) -> Usd.Prim:
+        prim = write_mesh(self.stage, path, mesh)
+        display_name(prim, mesh.name)
+        if mesh.material is not None:
+            bind(prim, self.materials[mesh.material])
+        for subset in mesh.subsets:
+            material = self.materials[subset.material]
+            name = self.names.child(path, material.name).name
+            faces = Vt.IntArray.FromNumpy(np.ascontiguousarray(subset.faces, np.int32))
+            bind_faces(UsdGeom.Mesh(prim), name, faces, material)
+        return prim
+
+    def _instance(self, path: Sdf.Path, index: int) -> None:
+        if index not in self._mesh_prototypes:
+            mesh = self.scene.meshes[index]
+            holder = self._new_prototype(mesh.name)
+            UsdGeom.Xform.Define(self.stage, holder)
+            self._mesh(holder.AppendChild("Mesh"), mesh)
+            self._mesh_prototypes[index] = holder
+        UsdGeom.Xform.Define(self.stage, path)
+        self.copies.add(path, self._mesh_prototypes[index])
+
+    def _new_prototype(self, name: str) -> Sdf.Path:
+        self.stage.CreateClassPrim(PROTOTYPES)
+        return self.names.child(PROTOTYPES, name)
+
+    def _skinned(self, node: Node, path: Sdf.Path, meshes: Sequence[int]) -> None:
+        root = self.names.child(path, self._skeletons.bones[id(node)].skin.name)
+        self.names.taken.setdefault(root, set()).add("Skeleton")
+        self._skeletons.write(self.stage, root, node)
+        for index in meshes:
+            mesh = self.scene.meshes[index]
+            prim = self._mesh(self.names.child(root, mesh.name), mesh)
+            self._skeletons.bind(prim, mesh, root, node)
+
+    # -- states ----------------------------------------------------------------------------
+
+    def _shown(self, node: Node, path: Sdf.Path) -> list[bool]:
+        """Whether each child is written visible: all are, but for those of states too many."""
+        children = self._children(node)
+        every = [True] * len(children)
+        states = states_of(node)
+        if states is None:
+            return every
+        size = states.shown.size
+        if size > MOST or self._opinions + size > _MOST_OPINIONS:
+            text = f"{len(states.names)} states of {len(children)} nodes are too many for variants"
+            text = f"{text}; what the current one does not show is invisible"
+            self._finding(Kind.REPLACED, "state-limit", node, text)
+            shown: list[bool] = states.current.tolist()
+            return shown
+        if states.kind == "lod":
+            text = (
+                f"{len(states.names)} levels of detail; variants of {path}, the nearest is "
+                "selected at all distances"
+            )
+            self._finding(Kind.REPLACED, "lod", node, text)
+        self._opinions += size
+        self._choices[path] = _Choice(states, states.selected)
+        return every
+
+    def is_shown(self, path: Sdf.Path) -> bool:
+        """Whether what is written at a path stands in its first place in the selected states."""
+        while True:
+            for above in path.GetPrefixes():
+                choice = self._choices.get(above.GetParentPath())
+                if choice is None or above not in choice.children:
+                    continue
+                if not choice.states.shown[choice.selected, choice.children.index(above)]:
+                    return False
+            prototype = self.copies.prototype(path)
+            if prototype is None:
+                return True
+            path = self.copies.uses[prototype][0]
+
+    def show(self, path: Sdf.Path) -> None:
+        """Select states that show what is written at a path, as like the source's as can be."""
+        for above in path.GetPrefixes():
+            choice = self._choices.get(above.GetParentPath())
+            if choice is None or above not in choice.children:
+                continue
+            shown = choice.states.shown
+            number = choice.children.index(above)
+            if not shown[choice.selected, number]:
+                alike = (shown == shown[choice.selected]).sum(axis=1)
+                choice.selected = int(np.argmax(np.where(shown[:, number], alike, -1)))
+
+    def together(self, one: Sdf.Path, other: Sdf.Path) -> bool:
+        """Whether any state shows two things; paths as they stand on the stage."""
+        common = one.GetCommonPrefix(other)
+        choice = self._choices.get(self.copies.written(common)) if self._choices else None
+        if choice is None or common in (one, other):
+            return True
+        names = [path.GetPrefixes()[common.pathElementCount].name for path in (one, other)]
+        known = [child.name for child in choice.children]
+        if not all(name in known for name in names):
+            return True  # a mesh or lamp of the node itself
+        shown = choice.states.shown
+        return bool((shown[:, known.index(names[0])] & shown[:, known.index(names[1])]).any())
+
+    def select(self, source: Sdf.Layer, chosen: Sdf.Layer) -> None:
+        """Select one state of each: the source's in a layer, what ``show`` changed in another."""
+        with Sdf.ChangeBlock():
+            for path, choice in self._choices.items():
+                select(source, path, choice.states, choice.states.selected)
+                if choice.selected != choice.states.selected:
+                    select(chosen, path, choice.states, choice.selected)
+
+    def _finding(self, kind: Kind, code: str, node: Node, text: str) -> None:
+        self.report.add(kind, code, node.source, node.name, text)
+
+
+def display_name(prim: Usd.Prim, name: str) -> None:
+    """Keep a source's name where the prim's differs."""
+    if name and prim.GetName() != name:
+        prim.SetDisplayName(name[:200])

@@ -1,0 +1,30 @@
+"""The schema of reports, as it is installed, and what a document has that it does not describe."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+from typing import Any
+
+from jsonschema import Draft202012Validator
+
+SCHEMA: dict[str, Any] = json.loads(
+    files("hdrusd.account").joinpath("report.schema.json").read_text(encoding="utf-8")
+)
+_VALIDATOR = Draft202012Validator(SCHEMA)
+
+
+def problems(document: dict[str, Any]) -> list[str]:
+    """What of a report, as JSON has it, its schema forbids."""
+    plain = json.loads(json.dumps(document))
+    return [f"{list(e.path)}: {e.message}" for e in _VALIDATOR.iter_errors(plain)]
+
+
+def undescribed(document: dict[str, Any]) -> set[str]:
+    """Keys of a report that its schema does not describe."""
+    found = set(document) - SCHEMA["properties"].keys()
+    tables = {"lights": "light", "materials": "material", "images": "image", "fix_first": "fix"}
+    for key, name in (tables | {"findings": "finding"}).items():
+        known = SCHEMA["$defs"][name]["properties"].keys()
+        found |= {f"{key}.{k}" for row in document.get(key, []) for k in row.keys() - known}
+    return found

@@ -1,0 +1,118 @@
+"""``[[lamp]]``: lamps that a database lacks stand where the photometry file says, as strong."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from builders import obj
+from converted import opened, run, sidecar
+from pxr import Usd, UsdGeom
+
+from hdrusd.job import Job
+from hdrusd.render import render_sequence
+from hdrusd.report import Report
+from hdrusd.usd.lux import read_lux
+
+FLOOR = """\
+mtllib a.mtl
+o Post_1
+v -20 0 20
+v 20 0 20
+v 20 0 -20
+v -20 0 -20
+usemtl floor
+f 1 2 3 4
+"""
+
+
+def floor(folder: Path) -> Path:
+    (folder / "a.mtl").write_text("newmtl floor\nKd 0.5 0.5 0.5\nKs 0 0 0\n")
+    (folder / "a.obj").write_text(FLOOR)
+    return folder / "a.obj"
+
+
+def where(prim: Usd.Prim) -> list[float]:
+    world = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0)
+    return [round(v, 6) for v in world.ExtractTranslation()]
+
+
+def test_places_are_in_the_units_of_the_source(tmp_path: Path) -> None:
+    source = floor(tmp_path)
+    sidecar(
+        tmp_path,
+        '[[lamp]]\nname = "Street"\nat = [[100, 300, 0], [-100, 300, 50]]\ncandela = 400\n'
+        'provenance = "measured"\n',
+    )
+    result = run(source, source_unit=0.01)
+    found = [prim for prim in opened(result).Traverse() if prim.GetTypeName() == "SphereLight"]
+    assert sorted(where(prim) for prim in found) == [[-1, 3, 0.5], [1, 3, 0]]
+    rows = [row for row in result.lights if row["kind"] == "point"]
+    assert [(row["value"], row["unit"], row["provenance"]) for row in rows] == [
+        (400.0, "cd", "measured")
+    ] * 2
+    assert result.counts["lights"] == 0  # of the source
+    assert not [code for code in result.report.codes() if code.startswith("sidecar")]
+
+
+def test_a_node_gets_its_lamp(tmp_path: Path) -> None:
+    source = obj(tmp_path / "a.obj", "Kd 0.5 0.5 0.5")
+    text = source.read_text()
+    source.write_text(text.replace("o Wall", "o Post_1") + "o Post_2\nf 1/1 2/2 3/3\n")
+    sidecar(
+        tmp_path,
+        '[[lamp]]\nmatch = "Post_*"\nname = "Head"\noffset = [0, 5, 1]\n'
+        "cutoff = 60\nlumens = 1000\n",
+    )
+    result = run(source)
+    found = [prim for prim in opened(result).Traverse() if prim.GetTypeName() == "SphereLight"]
+    assert len(found) == 2
+    assert [where(prim) for prim in found] == [[0, 5, 1]] * 2
+    for prim in found:
+        reading = read_lux(prim)
+        assert reading is not None
+        # A hard cone of 60 degrees: I = Phi / (2 pi (1 - cos 60)) = Phi / pi.
+        assert reading.intensity[0] == pytest.approx(1000.0 / math.pi, rel=1e-4)
+        down = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0).TransformDir((0, 0, -1))
+        assert list(down) == pytest.approx([0, -1, 0], abs=1e-6)
+
+
+def test_the_floor_below_is_lit(gl: Any, tmp_path: Path) -> None:
+    source = floor(tmp_path)
+    sidecar(
+        tmp_path,
+        "[ambient]\nilluminance = 0\n[[lamp]]\nat = [[0, 5, 0]]\ncandela = 250\n"
+        '[[camera]]\nmatch = "nothing"\n',
+    )
+    result = run(source)
+    stage = opened(result)
+    camera = UsdGeom.Camera.Define(stage, "/a/above")
+    camera.AddTranslateOp().Set((0.0, 20.0, 0.0))
+    camera.AddRotateXOp().Set(-90.0)
+    stage.GetRootLayer().Save()
+    job = Job(result.output, width=64, height=64, camera="/a/above", shadows=False)
+    (frame,) = render_sequence(gl, job, Report())
+    # 250 cd from 5 m: 10 lx below it; 0.5 / pi of that. The lamp itself is seen by nobody.
+    middle = np.asarray(frame.hdr)[31:33, 31:33].mean()
+    assert middle == pytest.approx(0.5 / math.pi * 10.0, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("[[lamp]]\ncandela = 5\n", "sidecar-invalid"),
+        ("[[lamp]]\nat = []\ncandela = 5\n", "sidecar-invalid"),
+        ("[[lamp]]\nat = [[1, 2]]\ncandela = 5\n", "sidecar-invalid"),
+        ('[[lamp]]\nmatch = "none"\ncandela = 5\n', "sidecar-no-match"),
+        ("[[lamp]]\nat = [[1, 2, 3]]\noffset = [1, 2, 3]\ncandela = 5\n", "sidecar-invalid"),
+        ("[[lamp]]\nat = [[1, 2, 3]]\ncandela = 5\nlumens = 7\n", "sidecar-rival"),
+        ("[[lamp]]\nat = [[1, 2, 3]]\n", "light-estimate"),
+    ],
+)
+def test_what_is_wrong_is_a_finding(tmp_path: Path, text: str, code: str) -> None:
+    source = floor(tmp_path)
+    sidecar(tmp_path, text)
+    assert code in run(source).report.codes()
