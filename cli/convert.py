@@ -81,9 +81,12 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Turn SOURCE (.3ds .dae .flt .gltf .glb .obj .osg .osgt) into a photometric stage OUTPUT.usda.
+    """Turn SOURCE into a photometric stage OUTPUT.usda.
 
-    Beside OUTPUT stand its layers (geometry, look, photometry) and textures.
+    SOURCE: a database (.3ds .dae .flt .gltf .glb .obj .osg .osgt), or a stage (.usd .usda .usdc
+    .usdz). Beside OUTPUT stand its layers (geometry, look, photometry) and textures. A stage
+    stays where it is and as it is; OUTPUT names it below a layer with its photometry, and may
+    not replace it.
     """
     from hdrusd.account.text import summary
     from hdrusd.conversion import Options

@@ -193,7 +193,8 @@ class _Conversion:
             if rule is not None:
                 camera = _node_camera(place, rule)
                 path = str(self.writer.write_node_camera(place, camera))
-                first = first or path
+                if first is None and self.writer.tree.is_shown(place.path):
+                    first = path
         return first or self.writer.first_camera
 
     def _show_nodes(self) -> None:

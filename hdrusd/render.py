@@ -178,16 +178,18 @@ class Renderer:
 
     def _lamps(self, scene: RenderScene, hdr: npt.NDArray[np.float32]) -> Doubles:
         """Lamps that the frame does not hold (glare/veil.py): beside it, or below a pixel."""
-        found = np.concatenate([eye_illuminance(scene), self.hdr.small_lamps(hdr)])
-        rows, merged, lost = most_dazzling(found)
-        if merged and not self._told_lamps:
+        small, pixels, owner = self.hdr.small_lamps(hdr)
+        found = most_dazzling(np.concatenate([small, eye_illuminance(scene)]), pixels, owner)
+        if (found.merged or found.pixels) and not self._told_lamps:
             self._told_lamps = True
             text = (
-                f"{merged} lamps below a pixel or beside the frame veil it together, within a "
-                f"degree; {100.0 * lost:.2g} % of the light at the eye are left out"
+                f"{found.merged} lamps below a pixel or beside the frame veil it together, within "
+                f"a degree; {100.0 * found.lost:.2g} % of all such light at the eye is left out"
             )
+            if found.pixels:
+                text += f"; {found.pixels} pixels that show lamps count beside them"
             self.report.add(Kind.ASSUMED, "glare-lamps", SourceRef(self.job.stage), "", text)
-        return rows
+        return found.rows
 
     def _sight(self, viewing: Viewing, camera: Camera, time: float, lamps: Doubles) -> Sight:
         """What the eye has to know of a frame."""

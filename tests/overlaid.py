@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pxr import Sdf, Usd, UsdMedia
 
 HEAD = '#usda 1.0\n(\n    defaultPrim = "World"\n    metersPerUnit = 1\n    upAxis = "Z"\n)\n'
@@ -79,6 +80,9 @@ def _plain(value: Any) -> Any:
     """A value that can be compared: of an asset what it resolves to."""
     if isinstance(value, Sdf.AssetPath):
         return value.resolvedPath or value.path
+    if hasattr(value, "__len__") and len(value) > 16:
+        array = np.asarray(value)
+        return array.tobytes() if array.dtype.kind in "biuf" else tuple(map(str, value))
     return str(value)
 
 

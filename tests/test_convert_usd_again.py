@@ -110,14 +110,14 @@ def test_a_stage_says_who_made_it_of_what(tmp_path: Path) -> None:
 def test_a_stage_does_not_replace_its_source(tmp_path: Path) -> None:
     source = stage_file(tmp_path / "town.usda", LAMP)
     before = source.read_bytes()
-    with pytest.raises(InputError, match="would replace .*town.usda; want another name"):
+    with pytest.raises(InputError, match=r"would replace .*town\.usda; want another name"):
         run(source, source)
     first = run(source, tmp_path / "night.usda")
     with pytest.raises(InputError, match="would replace"):
         run(first.output, first.output)
     layer = first.output.with_suffix(".photometry.usda")
     text = layer.read_bytes()
-    with pytest.raises(InputError, match="would replace .*night.photometry.usda"):
+    with pytest.raises(InputError, match=r"would replace .*night\.photometry\.usda"):
         run(layer, tmp_path / "night.usda")
     assert (source.read_bytes(), layer.read_bytes()) == (before, text)
 
@@ -160,12 +160,22 @@ def test_hostile_files(tmp_path: Path, testdata: Path, name: str) -> None:
 
 def test_a_circle_of_references_is_told_and_the_rest_converted(tmp_path: Path) -> None:
     for one, other in ("ab", "ba"):
-        text = f'#usda 1.0\n(\n    defaultPrim = "World"\n)\ndef Xform "World" (\n'
+        text = '#usda 1.0\n(\n    defaultPrim = "World"\n)\ndef Xform "World" (\n'
         text += f"    references = @./{other}.usda@\n)\n{{\n{LAMP}\n}}\n"
         (tmp_path / f"{one}.usda").write_text(text)
     result = run(tmp_path / "a.usda", tmp_path / "night.usda")
     assert [row["name"] for row in result.lights] == ["Lamp"]
     assert "usd-warning" in result.report.codes()
+
+
+def test_instances_beyond_counting_are_refused_at_once(tmp_path: Path) -> None:
+    """8 instances each of 8 instances, 16 deep: 8^16 lamps in 17 small files."""
+    stage_file(tmp_path / "0.usda", LAMP)
+    for level in range(1, 17):
+        below = f"(\n    instanceable = true\n    references = @./{level - 1}.usda@\n)\n{{\n}}"
+        stage_file(tmp_path / f"{level}.usda", *(f'def "I_{i}" {below}' for i in range(8)))
+    with pytest.raises(InputError, match=r"\d+ prims with all instances; want at most 1000000"):
+        run(tmp_path / "16.usda", tmp_path / "night.usda")
 
 
 # -- real stages ---------------------------------------------------------------------------
@@ -183,9 +193,7 @@ REAL = {
 
 
 @pytest.mark.parametrize("name", REAL)
-def test_real_stages_look_as_they_did(
-    gl: Any, tmp_path: Path, testdata: Path, name: str
-) -> None:
+def test_real_stages_look_as_they_did(gl: Any, tmp_path: Path, testdata: Path, name: str) -> None:
     """By the letter, with R = T^2.2: what the renderer makes of the source itself."""
     source = testdata / name
     result = run(source, tmp_path / "night.usda")

@@ -50,7 +50,11 @@ LETTER = [
     ("RectLight", "intensity = 300, width = 2, height = 0.5, normalize = 1", 300.0),
     ("CylinderLight", "intensity = 50, radius = 0.02, length = 1.5", 50 * 2 * 0.02 * 1.5),
     ("CylinderLight", "intensity = 50, radius = 0.02, length = 1.5, normalize = 1", 50 / math.pi),
-    ("DistantLight", "intensity = 50000, angle = 0.53", 50000 * math.pi * math.sin(math.radians(0.265)) ** 2),
+    (
+        "DistantLight",
+        "intensity = 50000, angle = 0.53",
+        50000 * math.pi * math.sin(math.radians(0.265)) ** 2,
+    ),
     ("DistantLight", "intensity = 10, angle = 0.53, normalize = 1", 10.0),
     ("DomeLight", "intensity = 2", 2 * math.pi),
 ]
@@ -92,7 +96,7 @@ def test_type_size_and_place_are_the_source_s(tmp_path: Path) -> None:
     layer = Sdf.Layer.FindOrOpen(str(result.output.with_suffix(".photometry.usda")))
     spec = layer.GetPrimAtPath("/World/Lamp")
     assert (spec.specifier, spec.typeName) == (Sdf.SpecifierOver, "")
-    said = {name.removeprefix("inputs:") for name in spec.attributes.keys()}
+    said = {name.removeprefix("inputs:") for name in map(str, spec.attributes.keys())}
     assert said == {
         "intensity",
         "color",
@@ -137,7 +141,9 @@ def test_time_codes_are_those_of_a_source_with_another_rate(tmp_path: Path) -> N
 
 
 def test_a_centimetre_stage_keeps_its_unit(tmp_path: Path) -> None:
-    head = '#usda 1.0\n(\n    defaultPrim = "World"\n    metersPerUnit = 0.01\n    upAxis = "Y"\n)\n'
+    head = (
+        '#usda 1.0\n(\n    defaultPrim = "World"\n    metersPerUnit = 0.01\n    upAxis = "Y"\n)\n'
+    )
     inside = "float inputs:intensity = 1000\nfloat inputs:radius = 10"
     result = convert(tmp_path, lamp("SphereLight", inside), head=head)
     prim = light(result)
@@ -154,6 +160,18 @@ def test_units_that_are_not_said_are_usd_s(tmp_path: Path) -> None:
     layer = Sdf.Layer.FindOrOpen(str(result.output))
     stated = [layer.pseudoRoot.GetInfo(name) for name in ("metersPerUnit", "upAxis")]
     assert stated == [0.01, "Y"]
+
+
+def test_a_unit_that_is_told_counts(tmp_path: Path) -> None:
+    head = '#usda 1.0\n(\n    defaultPrim = "World"\n    metersPerUnit = 1\n)\n'
+    inside = "float inputs:intensity = 1000\nfloat inputs:radius = 10"
+    source = stage_file(tmp_path / "town.usda", lamp("SphereLight", inside), head=head)
+    result = run(source, tmp_path / "night.usda", source_unit=0.01, up="Z")
+    candela = get(light(result), "inputs:photometric:luminousIntensity")
+    assert candela == pytest.approx(1000 * math.pi * 0.01, rel=CLOSE)
+    layer = Sdf.Layer.FindOrOpen(str(result.output))
+    stated = [layer.pseudoRoot.GetInfo(name) for name in ("metersPerUnit", "upAxis")]
+    assert stated == [0.01, "Z"]
 
 
 # -- somebody's word ---------------------------------------------------------------------
@@ -246,6 +264,21 @@ def test_a_sky_of_the_photometry_file_takes_the_place_of_domes(tmp_path: Path) -
     assert "ambient-replaced" in result.report.codes()
 
 
+def test_a_node_is_switched_off(tmp_path: Path) -> None:
+    toml = '[[node]]\nmatch = "/World/Moon"\nvisible = false\n'
+    result = convert(tmp_path, lamp("DistantLight", "", "Moon"), toml=toml)
+    assert get(light(result, "Moon"), "visibility") == "invisible"
+
+
+def test_what_a_stage_says_itself_is_not_asked_of_the_photometry_file(tmp_path: Path) -> None:
+    toml = '[[camera]]\nmatch = "Eye"\nfov = 40\n[[light]]\nmatch = "Lamp"\ncandela = 9\n'
+    toml += "fixture_shadow = true\n"
+    result = convert(tmp_path, lamp("SphereLight", "float inputs:radius = 1"), toml=toml)
+    unused = [finding.thing for finding in result.report if finding.code == "usd-rule-unused"]
+    assert unused == ["Eye", "Lamp"]
+    assert "sidecar-no-match" not in result.report.codes()
+
+
 def test_ies_takes_the_place_of_cone_and_candela(tmp_path: Path, ies: Path) -> None:
     toml = f'[[light]]\nmatch = "Lamp"\nies = "{ies.name}"\nscale = 2\n'
     inside = inputs("intensity = 1, radius = 0.1") + "\nfloat inputs:shaping:cone:angle = 30"
@@ -276,13 +309,19 @@ BLENDER += '    metersPerUnit = 1\n    upAxis = "Z"\n)\n'
 
 
 def test_blender_s_watts_are_told_and_read_when_asked(tmp_path: Path) -> None:
-    """glTF's 1000 cd are 1000 4 pi / 683 W in Blender, which writes W / pi with normalize 1; a
-    sun of 0.25 lx is 0.25 / 683 W/m2, which it writes over 4.
+    """The 1000 cd of a glTF are 1000 4 pi / 683 W in Blender, which writes W / pi with normalize
+    1; a sun of 0.25 lx is 0.25 / 683 W/m2, which it writes over 4.
     """
     watts = 1000 * 4 * math.pi / 683
     stage = (
-        lamp("SphereLight", inputs(f"intensity = {watts / math.pi!r}, radius = 0.1, normalize = 1")),
-        lamp("DistantLight", inputs(f"intensity = {0.25 / 683 / 4!r}, angle = 0, normalize = 1"), "Sun"),
+        lamp(
+            "SphereLight", inputs(f"intensity = {watts / math.pi!r}, radius = 0.1, normalize = 1")
+        ),
+        lamp(
+            "DistantLight",
+            inputs(f"intensity = {0.25 / 683 / 4!r}, angle = 0, normalize = 1"),
+            "Sun",
+        ),
     )
     told = convert(tmp_path, *stage, head=BLENDER)
     assert get(light(told), "inputs:photometric:luminousIntensity") == pytest.approx(

@@ -44,7 +44,9 @@ def photometry(result: Result) -> Sdf.Layer:
 
 
 def instance(name: str, extra: str = "", file: str = "car.usda") -> str:
-    return f'def "{name}" (\n    instanceable = true\n    references = @{file}@\n)\n{{\n{extra}\n}}\n'
+    return (
+        f'def "{name}" (\n    instanceable = true\n    references = @{file}@\n)\n{{\n{extra}\n}}\n'
+    )
 
 
 def test_instances_stay_instances_of_one_prototype(tmp_path: Path) -> None:

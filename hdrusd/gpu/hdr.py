@@ -193,10 +193,12 @@ class HdrRenderer:
         pixels = np.frombuffer(frame.read(components=3, dtype="f4"), np.float32)
         return np.ascontiguousarray(pixels.reshape(h, w, 3)[::-1])
 
-    def small_lamps(self, frame: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
-        """Of the last ``frame``, as ``read``: lamps that its pixels cannot show, (n, 6).
+    def small_lamps(
+        self, frame: npt.NDArray[np.float32]
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+        """Of the last ``frame``, as ``read``: lamps that its pixels cannot show.
 
-        Rows of glare/veil.py; gpu/small_lamps.py says which.
+        Rows of lamps, of pixels that show them, and whose these are (gpu/small_lamps.py).
         """
         return self._small.rows(frame)
 

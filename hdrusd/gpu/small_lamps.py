@@ -30,6 +30,7 @@ from hdrusd.scene import POINT, SPHERE, Camera, RenderScene
 
 Doubles = npt.NDArray[np.float64]
 Booleans = npt.NDArray[np.bool_]
+Ints = npt.NDArray[np.int64]
 
 #: Pixels across up to which a lamp counts by its candela alone, and from which on not at all.
 SMALL, LARGE = 1.0, 2.0
@@ -67,7 +68,7 @@ class SmallLamps:
         self._lamps: _Lamps | None = None
         self._window = (0.0, 0.0, 0.0, 0.0)
         self._visible: Doubles = np.zeros(0)
-        self._pixels: list[tuple[npt.NDArray[np.int64], Doubles]] = []
+        self._pixels: list[tuple[Ints, Ints, Doubles]] = []  # number, lamp, light
 
     def begin(self, scene: RenderScene) -> None:
         """Note the lamps of a scene that count by their candela."""
@@ -143,25 +144,25 @@ class SmallLamps:
         weight = np.zeros(len(found))
         np.maximum.at(weight, np.searchsorted(found, number), lamps.weight[lamp])
         light = np.maximum(np.nan_to_num(seen[lamp[first], which[first], :3]), 0.0)
-        self._pixels.append((found, share * weight[:, None] * light))
+        self._pixels.append((found, lamp[first], share * weight[:, None] * light))
 
-    def rows(self, frame: npt.NDArray[np.float32]) -> Doubles:
-        """Rows (n, 6) of glare/veil.py for the frame (h, w, 3), top row first.
+    def rows(self, frame: npt.NDArray[np.float32]) -> tuple[Doubles, Doubles, Ints]:
+        """Of the frame (h, w, 3), top row first: rows of glare/veil.py.
 
-        Lamps with lux, and pixels that show them with minus the share of their luminance. In
-        view space of a camera that looks at the middle of its window, as the veil has it.
+        Lamps (n, 6) with lux; pixels (m, 6) that show them with minus the share of their
+        luminance; and (m,) the lamp of each pixel, or -1. In view space of a camera that looks
+        at the middle of its window, as the veil has it.
         """
         lamps = self._lamps
         if lamps is None:
-            return np.zeros((0, 6))
+            return np.zeros((0, 6)), np.zeros((0, 6)), np.zeros(0, np.int64)
         left, right, bottom, top = self._window
         middle = (left + right) / 2.0, (bottom + top) / 2.0
         plane = lamps.towards[:, :2] / -lamps.towards[:, 2:] - middle
         lit = _rows(plane, lamps.lux * (lamps.weight * self._visible)[:, None])
-        lit = lit[np.any(lit[:, 3:] > 0.0, axis=1)]
-        number = np.concatenate([np.zeros(0, np.int64), *(pixel for pixel, _ in self._pixels)])
-        light = np.concatenate([np.zeros((0, 3)), *(light for _, light in self._pixels)])
-        found, which = np.unique(number, return_inverse=True)
+        shines = np.any(lit[:, 3:] > 0.0, axis=1)
+        number, owner, light = (np.concatenate(part) for part in zip(*self._pixels, strict=True))
+        found, first, which = np.unique(number, return_index=True, return_inverse=True)
         taken = np.zeros((len(found), 3))
         np.add.at(taken, which.ravel(), light)
         across, up = found % self.size[0], found // self.size[0]
@@ -169,7 +170,9 @@ class SmallLamps:
         shares = np.clip(taken / np.where(there > 0.0, there, np.inf), 0.0, 1.0)
         place = np.stack([across + 0.5, up + 0.5], axis=1) / self.size - 0.5
         shown = _rows(place * (right - left, top - bottom), -shares)
-        return np.concatenate([lit, shown[np.any(shares > 0.0, axis=1)]])
+        seen = np.any(shares > 0.0, axis=1)
+        numbered = np.where(shines, np.cumsum(shines) - 1, -1)
+        return lit[shines], shown[seen], numbered[owner[first]][seen]
 
     def release(self) -> None:
         """Give the program back."""
@@ -182,7 +185,7 @@ class SmallLamps:
         ball = (lights["shape"] == SPHERE) & has_beam(lights)
         return np.where((lights["shape"] == POINT) | ball, 0.0, extent(lights))
 
-    def _towards(self, scene: RenderScene, found: npt.NDArray[np.int64]) -> Doubles:
+    def _towards(self, scene: RenderScene, found: Ints) -> Doubles:
         away = np.asarray(scene.lights["position"])[found] - np.asarray(scene.camera.eye)
         return np.asarray(away @ scene.camera.rotation())
 
@@ -191,7 +194,7 @@ class SmallLamps:
         hdr: moderngl.Texture,
         normal: moderngl.Texture,
         diffuse: moderngl.Texture,
-        pixels: npt.NDArray[np.int64],
+        pixels: Ints,
     ) -> tuple[Doubles, Booleans]:
         """Of pixels (n, 9, 2): light and distance (n, 9, 4), and whether they scatter nothing."""
         if self._program is None:

@@ -37,7 +37,11 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
 
 def read_text(data: bytes, resolver: Resolver, report: Report) -> LegacyScene:
     """Read text that stands for ``resolver.source``. Raises InputError."""
-    document = parse(data, resolver.source, report, resolver.limits)
+    return read_document(parse(data, resolver.source, report, resolver.limits), resolver)
+
+
+def read_document(document: Document, resolver: Resolver) -> LegacyScene:
+    """The scene of a tree, whatever form it was in. Raises InputError."""
     return _SceneReader(document, resolver).read()
 
 

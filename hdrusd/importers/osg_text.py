@@ -22,6 +22,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -71,10 +72,15 @@ class Statement:
 
 @dataclass(slots=True, eq=False)
 class Block:
-    """What stands between two braces: statements, or numbers alone."""
+    """What stands between two braces: statements, or numbers alone.
+
+    A binary file has its numbers as ``values`` and the bytes of a picture as ``data``.
+    """
 
     statements: list[Statement] = field(default_factory=list)
     raw: bytes = b""
+    values: npt.NDArray[np.number[Any]] | None = None
+    data: memoryview | None = None
     _fields: dict[str, Statement] | None = None
 
     def field(self, key: str) -> Statement | None:
@@ -87,6 +93,8 @@ class Block:
 
     def numbers(self) -> Doubles:
         """All numbers, in order; NaN for a word among numbers that is none."""
+        if self.values is not None:
+            return self.values.astype(np.float64)
         if not self.statements:
             words = self.raw.split()
             try:
@@ -126,18 +134,22 @@ def _numeric(word: str) -> bool:
 
 @dataclass(slots=True)
 class Document:
-    """A parsed file. ``new`` is True for ``.osgt``, False for ``.osg``."""
+    """A parsed file. ``new`` is True for ``.osgt`` and ``.osgb``, False for ``.osg``.
+
+    Where ``binary``, the line of a statement is the number of its first byte.
+    """
 
     file: Path
     report: Report
     new: bool
+    binary: bool = False
     generator: str = ""
     root: Block = field(default_factory=Block)
     definitions: dict[str, Statement] = field(default_factory=dict)
 
     def ref(self, place: Statement) -> SourceRef:
         """Where a statement stands."""
-        return SourceRef(self.file, place.line)
+        return SourceRef(self.file, f"byte {place.line}" if self.binary else place.line)
 
     def add(self, kind: Kind, code: str, place: Statement, thing: str, text: str) -> None:
         """Note a finding at a statement."""
@@ -271,7 +283,7 @@ class _Parser:
         if text.isascii():
             words = list(map(bytes.decode, text.split()))
         else:
-            words = [_decoded(word) for word in text.split()]
+            words = [decoded(word) for word in text.split()]
         self._append(words)
         if words[0] == "UniqueID" and len(words) == 2 and self.stack:
             self.document.definitions.setdefault(words[1], self.stack[-1][0])
@@ -288,7 +300,7 @@ class _Parser:
         if found is None:
             raise self._error('text: not closed; want "', self.line)
         text = found[1]
-        self._append([_decoded(_ESCAPE.sub(rb"\1", text) if b"\\" in text else text)])
+        self._append([decoded(_ESCAPE.sub(rb"\1", text) if b"\\" in text else text)])
         self.line += text.count(b"\n")
         return found.end()
 
@@ -334,7 +346,7 @@ class _Parser:
         return InputError(SourceRef(self.document.file, line), problem)
 
 
-def _decoded(word: bytes) -> str:
+def decoded(word: bytes) -> str:
     """UTF-8, or Latin-1 where it is not that: old exporters wrote the local code page."""
     try:
         return word.decode()
@@ -362,6 +374,6 @@ def parse(data: bytes, file: Path, report: Report, limits: Limits) -> Document:
         if kind != [b"Scene"]:
             raise InputError(SourceRef(file, 1), "#Ascii: not a Scene; want #Ascii Scene")
         generator = re.search(rb"^#Generator[ \t]+([^\r\n]*)", data[:1024], re.MULTILINE)
-        document.generator = "" if generator is None else _decoded(generator[1]).strip()
+        document.generator = "" if generator is None else decoded(generator[1]).strip()
     _Parser(data, document, limits).run()
     return document

@@ -129,10 +129,17 @@ class TextureReader:
             text = "image sequence; its first picture is used"
             document.add(Kind.DROPPED, "osg-image-sequence", holder, name, text)
         empty = document.numbers(holder, 3, "size") == (0.0, 0.0, 0.0)  # osgconv found no file
-        if document.field(holder, "data") is not None and not (name and empty):
+        held = document.field(holder, "data", "inlinefile")
+        if held is not None and not (name and empty):
             key = id(holder)
             if key not in self._images:
-                self._images[key] = self._inline(name or f"inline_{holder.line}", holder)
+                name = name or f"inline_{holder.line}"
+                block = held.block
+                if held.key == "inlinefile" and block is not None and block.data is not None:
+                    file = bytes(block.data)  # a picture file as it was
+                    self._images[key] = Image(name, document.ref(holder), data=file)
+                else:
+                    self._images[key] = self._inline(name, holder)
             return self._images[key]
         return self._file(name, holder)
 
@@ -173,6 +180,8 @@ class TextureReader:
         if not plain and pixel_format not in _S3TC:  # whose type is written as the format or 0
             raise ValueError(f"format {pixel_format} of type {kind}; want 8-bit or S3TC")
         data = self.document.field(place, "data")
+        if data is not None and data.block is not None and data.block.data is not None:
+            return width, height, pixel_format, bytes(data.block.data)
         strings = [] if data is None or data.block is None else data.block.statements
         text = strings[0].words[0] if strings and strings[0].words else ""
         try:  # the levels below the first follow, in the same text or in their own
@@ -205,7 +214,7 @@ class TextureReader:
         if a_file:
             text = "OpenSceneGraph does not turn a DDS over; t runs down for it"
             self.document.add(Kind.ASSUMED, "osg-dds-rows", texture, image.name, text)
-        from_top = a_file or image.data is not None
+        from_top = a_file or (image.data is not None and image.data.startswith(b"DDS "))
         try:
             return uv_transform(values or _IDENTITY, from_top=from_top)
         except ValueError as error:

@@ -45,7 +45,7 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
     source = resolver.source
     suffix = source.suffix.lower()
     data = resolver.read()
-    _check_head(data, suffix, source)
+    check_head(data, suffix, source)
     program = shutil.which("osgconv")
     if program is None:
         text = f"{suffix} is read by osgconv, which is missing; install the package openscenegraph"
@@ -66,7 +66,8 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
         return osg.read_text(resolver.read(converted), resolver, report)
 
 
-def _check_head(data: bytes, suffix: str, source: Path) -> None:
+def check_head(data: bytes, suffix: str, source: Path) -> None:
+    """Raise InputError unless a file begins as one of its suffix does."""
     if not data:
         raise InputError(source, f"empty; want {suffix}")
     if data.startswith(b"version https://git-lfs"):

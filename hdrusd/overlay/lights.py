@@ -253,6 +253,10 @@ class LightOverlay:
         """What the number rests on, and what else it may be."""
         prim, strength = source.prim, source.brightest.strength
         unit = "lx" if source.kind in ("distant", "dome") else "cd"
+        if unit == "cd" and photometric_file(prim):
+            unit = "times its photometric file"
+        elif light_overs.pictured(prim):
+            unit = "lx where its picture is 1"
         text = f"{strength:.4g} {unit} by the letter of UsdLux 25.05"
         if self.unit.name != "nits":
             text = f"{strength:.4g} {unit} by light_unit {self.unit.name}"

@@ -31,7 +31,7 @@ from hdrusd.skies import SkyFiles
 from hdrusd.usd.authorship import authorship_inputs, write_authorship
 from hdrusd.usd.light_overs import light_places
 from hdrusd.usd.opening import usd_warnings
-from hdrusd.usd.overs import Overs, all_prims, relative
+from hdrusd.usd.overs import Overs, all_prims, population, relative
 from hdrusd.usd.placed import footprint
 from hdrusd.usd.source_stage import (
     copy_stage_metadata,
@@ -75,8 +75,16 @@ class Overlay:
         if source.stat().st_size > options.limits.file_bytes:
             raise InputError(source, f"want at most {options.limits.file_bytes} bytes")
         self.stage = open_source(source, self.resolver.allowed, report)
+        stated = {"metersPerUnit": options.source_unit, "upAxis": options.up}
+        for key, value in stated.items():
+            if value is not None:
+                self.stage.GetRootLayer().pseudoRoot.SetInfo(key, value)
         self.unit_stated = source_layer(self.stage).pseudoRoot.HasInfo("metersPerUnit")
         self._check_output()
+        count = population(self.stage)
+        if count > options.limits.nodes:
+            text = f"{count} prims with all instances; want at most {options.limits.nodes}"
+            raise InputError(source, text)
         stem = output.stem
         files = folder / f"{stem}.textures", f"./{stem}.textures"
         self.layer = Sdf.Layer.CreateNew(str(folder / f"{stem}.photometry.usda"))
@@ -134,13 +142,16 @@ class Overlay:
         """Write over what is there now; ``brought``: only over what a variant brings."""
         places = light_places(self.stage)
         for prim in list(all_prims(self.stage)):
+            material, here = prim.IsA(UsdShade.Material), places.get(prim.GetPath())
+            rule = self.sidecar.match("node", prim.GetName(), str(prim.GetPath()))
+            if not material and here is None and rule is None:
+                continue
             if brought is not None and not brought.has(self.overs, prim):
                 continue
-            if prim.IsA(UsdShade.Material):
+            if material:
                 self.materials.write(prim)
-            elif prim.GetPath() in places:
-                self.lights.write(prim, places[prim.GetPath()])
-            rule = self.sidecar.match("node", prim.GetName(), str(prim.GetPath()))
+            elif here is not None:
+                self.lights.write(prim, here)
             if rule is not None and "visible" in rule.values and prim.IsA(UsdGeom.Imageable):
                 token = "inherited" if rule.values["visible"] else "invisible"
                 self.overs.value(prim, "visibility", Sdf.ValueTypeNames.Token, token)
@@ -157,19 +168,17 @@ class Overlay:
             session.Clear()
             for choice in chain:
                 choice.select(session)
+            self.overs.forget()
             self._convert(chain[-1].brought(self.overs))
             chains += [(*chain, choice) for choice in self._unselected(chain)]
         session.Clear()
-        shared = [
-            str(_first)
-            for prototype in self.stage.GetPrototypes()
-            for prim in Usd.PrimRange(prototype)
-            if prim != prototype and prim.HasVariantSets()
-            for _first in [min(self.overs.places(prim))]
-        ]
-        for place in sorted(shared):
-            text = "variants inside an instance; only those selected are converted"
-            self._note(Kind.DROPPED, "usd-variants", place, text)
+        self.overs.forget()
+        for prototype in self.stage.GetPrototypes():
+            for prim in Usd.PrimRange(prototype):
+                if prim != prototype and prim.HasVariantSets():
+                    place = str(self.overs.place(prim).StripAllVariantSelections())
+                    text = "variants inside an instance; only those selected are converted"
+                    self._note(Kind.DROPPED, "usd-variants", place, text)
 
     def _unselected(self, chain: _Choices) -> list[Choice]:
         """The variants not selected: all, or those that the last of a chain brings itself."""
@@ -253,11 +262,7 @@ class Overlay:
             inputs = authorship_inputs(self.source, self.sidecar.path)
             write_authorship(self.layer, default.GetPath(), inputs)
         root = Sdf.Layer.CreateNew(str(self.folder / self.output.name))
-        copy_stage_metadata(source_layer(self.stage), root)
-        if self.options.source_unit is not None:
-            root.pseudoRoot.SetInfo("metersPerUnit", self.options.source_unit)
-        if self.options.up is not None:
-            root.pseudoRoot.SetInfo("upAxis", self.options.up)
+        copy_stage_metadata(self.stage.GetRootLayer(), root)
         way = os.path.relpath(self.source.resolve(), self.output.parent.resolve())
         root.subLayerPaths[:] = [f"./{self.output.stem}.photometry.usda", relative(Path(way))]
         for layer in (self.layer, root):

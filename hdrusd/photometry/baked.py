@@ -87,7 +87,7 @@ def baked_lamps(linear: Array) -> int:
     still above half of the way down to the picture's median after ``_GLOW`` texels, falls all
     the way, and has come down to a quarter of it at 8 times that.
     """
-    if min(linear.shape[:2]) < _LEAST:
+    if min(linear.shape[:2]) < _LEAST or linear.max() < _FULL:
         return 0
     picture = _block_means(linear, min(_SIDE, max(linear.shape[:2])))
     luminance = picture @ np.asarray(LUMINANCE_WEIGHTS)
@@ -110,12 +110,16 @@ def baked_lamps(linear: Array) -> int:
 def _block_means(linear: Array, most: int) -> Array:
     """The picture as means of at most ``most`` blocks a side, (m, n, 3)."""
     rows, columns = (min(size, most) for size in linear.shape[:2])
+    high, wide = linear.shape[0] // rows, linear.shape[1] // columns
+    if (high * rows, wide * columns) == linear.shape[:2]:  # whole blocks, several times as fast
+        lines = linear.reshape(rows, high, -1).sum(axis=1)
+        return np.asarray(lines.reshape(rows, columns, wide, 3).sum(axis=2) / (high * wide))
     top = np.arange(rows) * linear.shape[0] // rows
     left = np.arange(columns) * linear.shape[1] // columns
     sums = np.add.reduceat(np.add.reduceat(linear, top, axis=0), left, axis=1)
-    high = np.diff(np.append(top, linear.shape[0]))
-    wide = np.diff(np.append(left, linear.shape[1]))
-    return np.asarray(sums / (high[:, None, None] * wide[None, :, None]))
+    heights = np.diff(np.append(top, linear.shape[0]))
+    widths = np.diff(np.append(left, linear.shape[1]))
+    return np.asarray(sums / (heights[:, None, None] * widths[None, :, None]))
 
 
 def _smooth(blocks: Array) -> Array:

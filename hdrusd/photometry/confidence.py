@@ -19,7 +19,8 @@ LEVELS: tuple[Confidence, ...] = get_args(Confidence)
 MEANING: dict[Confidence, str] = {
     "high": "measured, or stated in a photometric unit with its source",
     "medium": "stated in a photometric unit without a source, or watts by the lamp's type",
-    "low": "typical of a class of lamps or surfaces, somebody's guess, or read out of a picture",
+    "low": "typical of a class of lamps or surfaces, somebody's guess, read out of a picture, "
+    "or a unit by the letter of UsdLux alone",
     "none": "by an estimate rule, from a colour that has no unit",
 }
 

@@ -1,10 +1,10 @@
 """What a USD file's light intensities count in: the letter of UsdLux, or a known writer's unit.
 
 Since OpenUSD 25.05 the text of UsdLux says nits. Stages are older than that, and writers go on
-as they were; a file does not say which. Blender (``USDLightWriter``, 3.6 to 5.0, without its
-option to write nits) writes watts: a lamp's power over pi with ``normalize`` 1, which by the
-letter is its watts per steradian; a sun's W/m2 over 4. Its glTF reader and writer count 683
-lm/W, so that candela that came in by glTF come out again; a spectrum of a real lamp has less.
+as they were; a file does not say which. Blender (``USDLightWriter`` of its source; measured with
+5.0.1) writes watts: a lamp's power over pi with ``normalize`` 1, which by the letter is its watts
+per steradian; a sun's W/m2 over 4. Its glTF reader and writer count 683 lm/W, so that candela
+that came in by glTF come out again; the light of a real lamp has fewer.
 """
 
 from __future__ import annotations

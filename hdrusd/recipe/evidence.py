@@ -32,6 +32,9 @@ _DOWN, _WIDE, _HIGH = math.cos(math.radians(30.0)), 40.0, 3.0
 #: Words of the part of a lamp that glows; the rest of it is a post.
 _GLASS = {"glass", "bulb", "lens", "glow", "emissive", "lit", "light", "lights", "globe", "neon"}
 
+#: Words of lamps of any kind: English, German, French, Spanish.
+_LAMPS = {"lamp", "lamps", "light", "lights", "lantern", "lampe", "leuchte", "laterne", "lampara"}
+
 #: A headlamp shines level, within 15 degrees, from 0.5 to 1.5 m (UN Regulation 48, 6.2.4).
 _LEVEL, _BUMPER = math.sin(math.radians(15.0)), (0.5, 1.5)
 
@@ -284,10 +287,17 @@ def _names(
     """What is called a lamp, but neither glows nor shines."""
     found = []
     for index, material in enumerate(scene.materials):
-        named = _class(_texts(material, [])[:3])
+        if index in glowing or not wearers.get(index):
+            continue
+        own = _texts(material, [])
+        named = _class(own)
+        telling = next((name for name in own if _LAMPS & set(words(name))), "")
+        if named is None and telling:
+            reason = f"its name, {telling}"
+            found.append(Lead("material", escape(material.name), "name", reason, None, False))
         if named is not None and named[0].key != "luminance" and not _GLASS & set(words(named[1])):
             continue
-        if index not in glowing and named is not None and wearers.get(index):
+        if named is not None:
             reason = f"its name, {named[1]}"
             lead = Lead("material", escape(material.name), "name", reason, named[0], False)
             lead.count = len(wearers[index])

@@ -47,6 +47,8 @@ def _entry(lead: Lead) -> str:
     if kind is None:
         key = "luminance" if lead.section == "material" else "candela"
         rows.append(f"{key} = 0  # want a number")
+        if lead.section == "material" and not lead.certain:
+            rows.append("hdr_texture = true  # it shines as its picture does")
     else:
         rows += _values(lead, kind)
     body = "\n".join(rows if lead.counts else [f"# {row}" for row in rows])
@@ -55,8 +57,6 @@ def _entry(lead: Lead) -> str:
 
 def _values(lead: Lead, kind: LampClass) -> Iterator[str]:
     yield f"{kind.key} = {kind.typical:.10g}"
-    if lead.found == "spots":
-        yield "hdr_texture = true"
     if kind.lamp and lead.section != "material":
         yield f"lamp = {quoted(kind.lamp)}"
     elif kind.color is not None and lead.section != "material":

@@ -30,7 +30,9 @@ def free_lamps(
     ]
     placed = [(lamp, path) for lamp in lamps for path in copies.places(lamp.prim.GetPath())]
     standing = [Lamp(stage.GetPrimAtPath(path), lamp.light) for lamp, path in placed]
+    tree.show_all()
     find_fixtures(stage, scene, meshes, standing, tree.together)
+    tree.preview()
     inside: dict[Sdf.Path, dict[Sdf.Path, PlacedMesh]] = {}
     beside: list[tuple[Sdf.Path, list[PlacedMesh]]] = []
     for (lamp, path), found in zip(placed, standing, strict=True):

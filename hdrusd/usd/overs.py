@@ -31,6 +31,13 @@ class Overs:
         self._classes: dict[tuple[str, ...], Sdf.Path] = {}  # places of instances -> their class
         self._heirs: dict[Sdf.Path, tuple[str, ...]] = {}  # of classes with nothing in them yet
         self._names = Names()
+        self._known: dict[Sdf.Path, Sdf.Path] = {}  # prototype -> its class
+        self._borne: dict[Sdf.Path, set[str]] = {}  # prototype -> places of its instances
+
+    def forget(self) -> None:
+        """To be called when the stage has changed: USD calls other prototypes by the same path."""
+        self._known.clear()
+        self._borne.clear()
 
     # -- where -----------------------------------------------------------------------------
 
@@ -57,18 +64,24 @@ class Overs:
         found = {str(self.place(prim))}
         chain = _chain(prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim)
         if chain and chain[0].IsPrototype():
-            found.update(*(self.places(instance) for instance in chain[0].GetInstances()))
+            path = chain[0].GetPath()
+            if path not in self._borne:
+                instances = chain[0].GetInstances()
+                self._borne[path] = set().union(*(self.places(it) for it in instances))
+            found |= self._borne[path]
         return found
 
     def _class(self, prototype: Usd.Prim) -> Sdf.Path:
         """The class of a prototype, which all its instances are to inherit."""
-        instances = sorted((str(self.place(it)), it.GetName()) for it in prototype.GetInstances())
-        # USD gives the path of a prototype to another one when the stage changes.
-        heirs = tuple(place for place, _ in instances)
-        if heirs not in self._classes:
-            self._classes[heirs] = self._names.child(CLASSES, instances[0][1])
-            self._heirs[self._classes[heirs]] = heirs
-        return self._classes[heirs]
+        path = prototype.GetPath()
+        if path not in self._known:
+            instances = [(str(self.place(it)), it.GetName()) for it in prototype.GetInstances()]
+            heirs = tuple(place for place, _ in sorted(instances))
+            if heirs not in self._classes:
+                self._classes[heirs] = self._names.child(CLASSES, min(instances)[1])
+                self._heirs[self._classes[heirs]] = heirs
+            self._known[path] = self._classes[heirs]
+        return self._known[path]
 
     def _spec(self, place: Sdf.Path) -> Sdf.PrimSpec:
         """The prim spec at a place, made when it is not there; a class with its heirs."""
@@ -158,21 +171,39 @@ def all_prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
     USD numbers prototypes as its threads meet them, so they come by their first instance.
     """
     yield from stage.Traverse()
-    yield from (
-        prim
-        for prototype in sorted(stage.GetPrototypes(), key=_first_place)
-        for prim in Usd.PrimRange(prototype)
-        if prim != prototype
-    )
+    known: dict[Sdf.Path, str] = {}
+
+    def first_place(prototype: Usd.Prim) -> str:
+        path = prototype.GetPath()
+        if path not in known:
+            known[path] = min(map(place, prototype.GetInstances()))
+        return known[path]
+
+    def place(prim: Usd.Prim) -> str:
+        chain = _chain(prim)
+        if not chain[0].IsPrototype():
+            return str(prim.GetPath())
+        return "/".join([first_place(chain[0]), *(it.GetName() for it in chain[1:])])
+
+    for prototype in sorted(stage.GetPrototypes(), key=first_place):
+        yield from (prim for prim in Usd.PrimRange(prototype) if prim != prototype)
 
 
-def _first_place(prim: Usd.Prim) -> str:
-    """The path of a prim, or the first of those that a prim of a prototype stands for."""
-    chain = _chain(prim)
-    if not chain or not chain[0].IsPrototype():
-        return str(prim.GetPath())
-    above = min(_first_place(instance) for instance in chain[0].GetInstances())
-    return "/".join([above, *(it.GetName() for it in chain[1:])])
+def population(stage: Usd.Stage) -> int:
+    """How many prims there are with all that instances show, counted without going there."""
+    known: dict[Sdf.Path, int] = {}
+
+    def size(root: Usd.Prim) -> int:
+        path = root.GetPath()
+        if path not in known:
+            known[path] = 0
+            known[path] = sum(
+                1 + (size(prim.GetPrototype()) if prim.IsInstance() else 0)
+                for prim in Usd.PrimRange(root)
+            )
+        return known[path]
+
+    return size(stage.GetPseudoRoot())
 
 
 def _chain(prim: Usd.Prim) -> list[Usd.Prim]:

@@ -50,6 +50,9 @@ class TreeWriter:
     """Writes the nodes of a scene below ``root`` into ``layer``, the stage's edit target.
 
     ``unit``: scene units a source unit; ``metres``: a source unit.
+
+    Until ``select`` all states are composed, so that what stands in any can be written to; what
+    the selected ones do not show is invisible, by the stage's session layer.
     """
 
     def __init__(
@@ -90,7 +93,7 @@ class TreeWriter:
         self._uses: dict[int, int] = {}
 
     def write(self) -> None:
-        """All of it. Until something is selected all states are composed at once."""
+        """All of it."""
         self._uses = self._mesh_uses()
         stack = self._entered(self.scene.roots, self.root, [True] * len(self.scene.roots))
         while stack:
@@ -120,6 +123,7 @@ class TreeWriter:
                 spec.instanceable = True
             for path, choice in self._choices.items():
                 write_states(self.layer, path, choice.states, choice.children, self.metres)
+        self.preview()
 
     def _entered(
         self, nodes: Sequence[Node], parent: Sdf.Path, shown: Sequence[bool]
@@ -227,8 +231,9 @@ class TreeWriter:
         self._skeletons.write(self.stage, root, node)
         for index in meshes:
             mesh = self.scene.meshes[index]
-            prim = self._mesh(self.names.child(root, mesh.name), mesh)
-            self._skeletons.bind(prim, mesh, root, node)
+            child = self.names.child(root, mesh.name)
+            self.meshes.append(PlacedMesh(child, root, index))
+            self._skeletons.bind(self._mesh(child, mesh), mesh, root, node)
 
     # -- states ----------------------------------------------------------------------------
 
@@ -256,6 +261,21 @@ class TreeWriter:
         self._choices[path] = _Choice(states, states.selected)
         return every
 
+    def preview(self) -> None:
+        """Hide, for the time of writing, what the selected states do not show."""
+        session = self.stage.GetSessionLayer()
+        with Sdf.ChangeBlock():
+            session.Clear()
+            for choice in self._choices.values():
+                for number in np.flatnonzero(~choice.states.shown[choice.selected]).tolist():
+                    prim = Sdf.CreatePrimInLayer(session, choice.children[number])
+                    hidden = Sdf.AttributeSpec(prim, "visibility", Sdf.ValueTypeNames.Token)
+                    hidden.default = UsdGeom.Tokens.invisible
+
+    def show_all(self) -> None:
+        """Hide nothing for its state, until ``preview``."""
+        self.stage.GetSessionLayer().Clear()
+
     def is_shown(self, path: Sdf.Path) -> bool:
         """Whether what is written at a path stands in its first place in the selected states."""
         while True:
@@ -272,6 +292,7 @@ class TreeWriter:
 
     def show(self, path: Sdf.Path) -> None:
         """Select states that show what is written at a path, as like the source's as can be."""
+        changed = False
         for above in path.GetPrefixes():
             choice = self._choices.get(above.GetParentPath())
             if choice is None or above not in choice.children:
@@ -281,6 +302,9 @@ class TreeWriter:
             if not shown[choice.selected, number]:
                 alike = (shown == shown[choice.selected]).sum(axis=1)
                 choice.selected = int(np.argmax(np.where(shown[:, number], alike, -1)))
+                changed = True
+        if changed:
+            self.preview()
 
     def together(self, one: Sdf.Path, other: Sdf.Path) -> bool:
         """Whether any state shows two things; paths as they stand on the stage."""
@@ -298,6 +322,7 @@ class TreeWriter:
     def select(self, source: Sdf.Layer, chosen: Sdf.Layer) -> None:
         """Select one state of each: the source's in a layer, what ``show`` changed in another."""
         with Sdf.ChangeBlock():
+            self.stage.GetSessionLayer().Clear()
             for path, choice in self._choices.items():
                 select(source, path, choice.states, choice.states.selected)
                 if choice.selected != choice.states.selected:

@@ -233,11 +233,8 @@ class StageWriter:
 
     def diagonal(self) -> float:
         """Of the whole scene in its selected states, m."""
-        session = Sdf.Layer.CreateAnonymous()
-        self.tree.select(session, session)
-        stage = Usd.Stage.Open(self.stage.GetRootLayer(), session)
         cache = UsdGeom.BBoxCache(Usd.TimeCode.EarliestTime(), [UsdGeom.Tokens.default_])
-        box = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
+        box = cache.ComputeWorldBound(self.stage.GetPseudoRoot()).ComputeAlignedRange()
         return 0.0 if box.IsEmpty() else float(box.GetSize().GetLength()) * self.meters_per_unit
 
     def save(self) -> None:

@@ -14,7 +14,7 @@ from stage_text import GROUND, write_stage
 
 from hdrusd.images import read_exr_header, read_image
 
-#: 500 cd, never seen as a shape; and a ball of 2 cm.
+#: 500 cd, never seen as a shape; and a ball 2 cm wide.
 LAMPS = """
 def SphereLight "Point"
 {
@@ -66,7 +66,7 @@ def test_a_lamp_that_moves_by_parts_of_a_pixel_does_not_make_the_picture_flicker
 ) -> None:
     """Below half a per cent from frame to frame, as docs/eye.md has it, through an eye in time.
 
-    0.7 pixels across and 0.7 pixels a frame: hit in some frames and missed in others.
+    0.9 pixels across, 0.8 pixels a frame: hit in some frames and missed in others.
     """
     stage = write_stage(
         tmp_path / "a.usda", GROUND, LAMPS, head="startTimeCode = 1\n    endTimeCode = 25"

@@ -24,7 +24,7 @@ def test_few_stay_as_they_are() -> None:
     rows = lamps(*random.uniform(-40.0, 40.0, (2, MOST_LAMPS)), random.uniform(0.0, 2.0, 128))
     got = most_dazzling(rows)
     np.testing.assert_array_equal(got.rows, rows.astype(np.float32))
-    assert got[1:] == (0, 0.0)
+    assert got[1:] == (0, 0.0, 0)
     assert most_dazzling(np.zeros((0, 6))).rows.shape == (0, 6)
 
 
@@ -55,9 +55,16 @@ def test_what_is_too_much_all_over_is_told() -> None:
     assert apart.max() < 1e-6
 
 
-def test_pixels_are_not_lamps() -> None:
-    rows = lamps(np.linspace(-9.0, 9.0, 300), np.zeros(300), -np.linspace(0.1, 1.0, 300))
-    got = most_dazzling(np.concatenate([rows, lamps(*np.zeros((2, 1)), np.ones(1))]))
-    assert len(got.rows) == MOST_PIXELS + 1
-    assert got.rows[0, 3] == 1.0
-    np.testing.assert_array_equal(got.rows[1:], rows[-MOST_PIXELS:].astype(np.float32))
+def test_pixels_that_show_lamps_go_with_them() -> None:
+    """Of 400 lamps that are too many, those that are left out veil by their pixels as before."""
+    x, y = (v.ravel() * 4.0 for v in np.mgrid[-10:10, -10:10])
+    rows = lamps(x, y, np.ones(400))
+    pixels, owner = lamps(x, y, -np.ones(400)), np.arange(400)
+    got = most_dazzling(rows, pixels, owner)
+    lit, shown = got.rows[:MOST_LAMPS], got.rows[MOST_LAMPS:]
+    assert {tuple(row) for row in shown[:, :3]} == {tuple(row) for row in lit[:, :3]}
+    assert got.pixels == 0
+    # A pixel of no lamp, and more pixels than there is room for.
+    few = most_dazzling(rows[:1], np.tile(pixels[:1], (600, 1)), np.full(600, -1))
+    assert len(few.rows) == 1 + MOST_PIXELS
+    assert few.pixels == 600 - MOST_PIXELS

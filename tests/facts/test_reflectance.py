@@ -9,7 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hdrusd.photometry.reflectance import blinn_phong, half_cosine, lambert, reflectance_table
+from hdrusd.photometry.reflectance import (
+    blinn_phong,
+    coded_reflectance,
+    half_cosine,
+    lambert,
+    reflectance_table,
+)
 
 PI = math.pi
 
@@ -107,3 +113,21 @@ def test_published_vectors(testdata: Path) -> None:
     key = next(name for name in vectors if name.startswith("blinn-phong norm n=32"))
     got = blinn_phong(np.float64(1.0), np.float64(32.0), 1 / PI)
     assert got == pytest.approx(vectors[key][0], rel=1e-14)
+
+
+@pytest.mark.parametrize("channels", [1, 2, 3, 4])
+@pytest.mark.parametrize("diffuse", [(0.8, 0.8, 0.8), (0.5, 1.0, 0.0)])
+@pytest.mark.parametrize("size", [(1, 1), (3, 5), (130, 257)])
+def test_coded_reflectance_is_rounded_once(
+    channels: int, diffuse: tuple[float, float, float], size: tuple[int, int]
+) -> None:
+    """All codes in all channels, odd and even numbers of them, one block and several."""
+    codes = np.random.default_rng(3).integers(0, 256, (*size, channels)).astype(np.uint8)
+    color = codes[..., :3] if channels > 2 else codes[..., :1]
+    wanted = (np.broadcast_to(color, (*size, 3)) / 255.0) ** 2.2 * np.array(diffuse)
+    found = coded_reflectance(codes, 2.2, diffuse)
+    assert found.dtype == np.float16
+    np.testing.assert_array_equal(found[..., :3], wanted.astype(np.float16))
+    if channels in (2, 4):
+        np.testing.assert_array_equal(found[..., 3], (codes[..., -1] / 255.0).astype(np.float16))
+    assert found.shape[2] == (4 if channels in (2, 4) else 3)

@@ -85,7 +85,7 @@ def frame_and_rows(
     frame = renderer.read()
     rows = renderer.small_lamps(frame)
     renderer.release()
-    return frame, most_dazzling(rows).rows
+    return frame, most_dazzling(*rows).rows
 
 
 def veiled(frame: np.ndarray, rows: np.ndarray) -> np.ndarray:

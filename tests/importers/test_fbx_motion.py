@@ -119,6 +119,28 @@ def test_skin(tmp_path: Path) -> None:
     np.testing.assert_allclose(dense, [[1, 0], [0.75, 0.25], [0.25, 0.75], [0, 0]], atol=1e-7)
 
 
+def test_geometric_transform_of_a_skinned_mesh_counts_once(tmp_path: Path) -> None:
+    """FBX SDK: bone now, bone at bind inverted, mesh at bind, geometric transform, point."""
+    fbx = Fbx()
+    node = fbx.model("n", "Mesh", P("GeometricTranslation", 3.0, 0.0, 0.0))
+    geometry = fbx.mesh(node, SQUARE, [(0, 1, 2, 3)])
+    bone = fbx.model("bone", "LimbNode", P("Lcl Translation", 0.0, 5.0, 0.0))
+    skin = fbx.add("Deformer", "s", "Skin", "Version: 101", under=geometry)
+    link = np.eye(4)
+    link[3, 1] = 5.0
+    body = (
+        array("Indexes", [0, 1, 2, 3]),
+        array("Weights", [1.0] * 4),
+        array("Transform", np.linalg.inv(link).reshape(-1).tolist()),
+        array("TransformLink", link.reshape(-1).tolist()),
+    )
+    fbx.connect(bone, fbx.add("Deformer", "", "Cluster", "Version: 100", *body, under=skin))
+    scene, _ = load(fbx.write(tmp_path))
+    points = np.column_stack([scene.meshes[0].points, np.ones(4)])
+    world = points @ scene.skins[0].inverse_binds[0] @ link
+    np.testing.assert_allclose(world[:, :3], np.add(SQUARE, (3.0, 0.0, 0.0)), atol=1e-6)
+
+
 def test_levels_of_detail(tmp_path: Path) -> None:
     """Thresholds 100 and 300: the middle level is shown between them."""
     fbx = Fbx()
