@@ -1,10 +1,11 @@
 """Every database and stage below a folder, from reading to a picture, hostile ones included.
 
     python -m tests.corpus [DIR] [--out DIR] [--markdown FILE] [--only PATTERN]
-                           [--gallery DIR [--public]]
+                           [--workers N] [--gallery DIR [--public]]
 
-A legacy file is converted, checked and rendered; a USD file is described and rendered. Each
-command runs in a process of its own under limits. A file passes when it ends in a picture
+A legacy file is converted, checked and rendered; a USD file is described and rendered, and
+then, as a row of its own, converted, checked and rendered. Each command runs in a process of
+its own under limits, which its worker processes inherit. A file passes when it ends in a picture
 with light in it (black where all its materials are), or in one line on standard error and a
 documented exit code; either way nothing may be written outside the output folder and nothing
 half-written may stay.
@@ -35,11 +36,13 @@ from typing import Any
 import numpy as np
 
 from hdrusd.images import read_exr
+from hdrusd.importers.importer import SUFFIXES as LEGACY
+from hdrusd.overlay.stage import SUFFIXES as STAGES
 
 from .gallery import PRIVATE, write_sheets
 
-LEGACY = (".3ds", ".fbx", ".flt", ".gltf", ".glb", ".obj", ".osg", ".osgt", ".dae", ".zae")
-STAGES = (".usda", ".usdc", ".usd", ".usdz")
+#: What follows the name of a stage that was converted before it was rendered.
+CONVERTED = ", converted"
 
 #: Files whose picture is black: the camera of this one stands in a hall and ends before its walls.
 BLACK = ("gazebo/office_building/*",)
@@ -47,8 +50,9 @@ BLACK = ("gazebo/office_building/*",)
 #: Exit codes of the README that say why a file ended without a picture.
 REFUSALS = range(1, 6)
 
-#: Address space of a conversion, bytes: a declared size that is believed ends here.
-CONVERT_BYTES = 2 << 30
+#: Address space of what reads a file first, and of each of its worker processes, bytes: a
+#: declared size that is believed ends here.
+READING_BYTES = 2 << 30
 
 #: Wall time of each command, seconds.
 SECONDS = 60.0
@@ -71,7 +75,7 @@ COLUMNS = ("file", "outcome", "triangles", "materials", "textures", "lights", "f
 class Row:
     """What became of one file. ``problem`` is empty where it passed."""
 
-    name: str  # relative to the folder, with slashes
+    name: str  # relative to the folder, with slashes; a stage's second row ends in CONVERTED
     code: int = 0
     message: str = ""  # the line on standard error of a refusal
     seconds: float = 0.0
@@ -114,7 +118,8 @@ class RefusedError(Exception):
 
 def corpus_files(folder: Path, only: str = "*") -> list[Path]:
     """The databases and stages below ``folder`` whose relative path matches ``only``."""
-    known = (path for path in folder.rglob("*") if path.suffix.lower() in LEGACY + STAGES)
+    suffixes = {*LEGACY, *STAGES}
+    known = (path for path in folder.rglob("*") if path.suffix.lower() in suffixes)
     files = (path for path in known if path.is_file())
     return sorted(path for path in files if fnmatch(path.relative_to(folder).as_posix(), only))
 
@@ -122,14 +127,20 @@ def corpus_files(folder: Path, only: str = "*") -> list[Path]:
 def run_corpus(
     folder: Path, files: Iterable[Path], output: Path, workers: int = 1
 ) -> Iterator[Row]:
-    """Try each file, in order, into a folder of its own below ``output``."""
+    """Try each file, in order, stages both ways, into a folder of its own below ``output``."""
+    tasks = (
+        (file, conversion)
+        for file in files
+        for conversion in ((False, True) if file.suffix.lower() in STAGES else (True,))
+    )
     with ThreadPoolExecutor(workers) as pool:
-        yield from pool.map(lambda file: _try(folder, file, output), files)
+        yield from pool.map(lambda task: _try(folder, *task, output), tasks)
 
 
-def _try(folder: Path, file: Path, output: Path) -> Row:
-    row = Row(file.relative_to(folder).as_posix())
-    case = Case(folder, file, _home(output, row))
+def _try(folder: Path, file: Path, conversion: bool, output: Path) -> Row:
+    name = file.relative_to(folder).as_posix()
+    row = Row(name + CONVERTED * (conversion and file.suffix.lower() in STAGES))
+    case = Case(folder, file, conversion, _home(output, row))
     before = listing(folder)
     start = time.perf_counter()
     try:
@@ -155,6 +166,7 @@ class Case:
 
     folder: Path
     file: Path
+    conversion: bool  # before it is rendered
     home: Path
 
     def __post_init__(self) -> None:
@@ -168,32 +180,13 @@ class Case:
 
     def run(self, row: Row) -> None:
         """Fill in ``row``. Raises RefusedError, WrongError."""
-        if self.file.suffix.lower() in STAGES:
-            stage = self.file
-            described = self._json(["info", str(stage), "--json"])
-            row.counts = {name: described[name] for name in ("triangles", "materials")}
-            row.counts["lights"] = int(str(described["lights"]).partition(",")[0])
-            row.findings = 0
-        else:
-            stage = self.out / "stage.usda"
-            roots = self._roots()
-            converted = self._json(
-                ["convert", str(self.file), str(stage), *roots, "--json", "--quiet"], CONVERT_BYTES
-            )
-            row.counts = converted["counts"] | {
-                "textures": len(converted["textures"]),
-                "lights": len(converted["lights"]),
-            }
-            row.findings = len(converted["findings"])
-            row.codes.update(finding["code"] for finding in converted["findings"])
-            row.dark = _reflects_nothing(converted["materials"])
-            self._hdrusd(["check", str(stage)])
+        stage = self._converted(row) if self.conversion else self._described(row)
         exr, png = self.out / "frame.exr", self.out / "frame.png"
         size = ["--imageWidth", str(WIDTH), "--imageHeight", str(HEIGHT)]
         rendered = self._json(
             ["render", str(stage), str(exr), "--png", str(png), *size, "--json", "--quiet"]
         )
-        row.findings += len(rendered["findings"])
+        row.findings = (row.findings or 0) + len(rendered["findings"])
         row.codes.update(finding["code"] for finding in rendered["findings"])
         rgb, _ = read_exr(exr)
         if rgb.shape != (HEIGHT, WIDTH, 3) or not np.isfinite(rgb).all():
@@ -205,6 +198,28 @@ class Case:
         if row.lit == 0.0 and not (row.dark and row.counts["triangles"]):
             raise WrongError("the picture is black")
         row.dark = row.lit == 0.0
+
+    def _described(self, row: Row) -> Path:
+        """The stage as it is, and what ``info`` counts in it."""
+        described = self._json(["info", str(self.file), "--json"], READING_BYTES)
+        row.counts = {name: described[name] for name in ("triangles", "materials")}
+        row.counts["lights"] = int(str(described["lights"]).partition(",")[0])
+        return self.file
+
+    def _converted(self, row: Row) -> Path:
+        """The stage that ``convert`` makes, checked."""
+        stage = self.out / "stage.usda"
+        command = ["convert", str(self.file), str(stage), *self._roots(), "--json", "--quiet"]
+        converted = self._json(command, READING_BYTES)
+        row.counts = converted["counts"] | {
+            "textures": len(converted["textures"]),
+            "lights": len(converted["lights"]),
+        }
+        row.findings = len(converted["findings"])
+        row.codes.update(finding["code"] for finding in converted["findings"])
+        row.dark = _reflects_nothing(converted["materials"])
+        self._hdrusd(["check", str(stage)])
+        return stage
 
     def strays(self, *, refused: bool) -> str:
         """What lies where nothing may lie; empty when all is well."""
@@ -294,14 +309,14 @@ def markdown(rows: Sequence[Row]) -> str:
 def write_gallery(rows: Iterable[Row], output: Path, gallery: Path, *, public: bool) -> None:
     """Contact sheets of the pictures below ``output`` and ``gallery.md`` into ``gallery``.
 
-    What is black as its materials has no tile. ``public``: without what may not be shown by
-    its licence, and what is broken on purpose.
+    What is black as its materials has no tile, and a stage only one, as it is. ``public``:
+    without what may not be shown by its licence, and what is broken on purpose.
     """
     hidden = PRIVATE if public else ()
     pictures, lines = [], ["| file | findings |", "| --- | --- |"]
     for row in rows:
         picture = _home(output, row) / "out" / "frame.png"
-        left_out = any(fnmatch(row.name, pattern) for pattern in hidden)
+        left_out = any(fnmatch(row.name, pattern) for pattern in (*hidden, f"*{CONVERTED}"))
         if row.code or row.problem or row.dark or left_out:
             continue
         pictures.append((row.name, picture))
@@ -328,6 +343,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, help="Keep the stages and pictures in this folder.")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="Write the table.")
     parser.add_argument("--only", default="*", metavar="PATTERN", help="Paths that match.")
+    parser.add_argument("--workers", type=int, default=1, help="Files at a time.")
     parser.add_argument("--gallery", type=Path, metavar="DIR", help="Write contact sheets.")
     parser.add_argument("--public", action="store_true", help="In them only what may be shown.")
     options = parser.parse_args(arguments)
@@ -340,7 +356,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rows = []
     with tempfile.TemporaryDirectory(prefix="hdrusd-corpus-") as scratch:
         output = options.out.resolve() if options.out else Path(scratch)
-        for row in run_corpus(folder, corpus_files(folder, options.only), output):
+        for row in run_corpus(folder, corpus_files(folder, options.only), output, options.workers):
             rows.append(row)
             print("  ".join(row.cells()), flush=True)
         if options.gallery is not None:

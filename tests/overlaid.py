@@ -86,9 +86,9 @@ def _plain(value: Any) -> Any:
     return str(value)
 
 
-def record(stage: Usd.Stage) -> dict[str, Any]:
-    """What the AuthorshipAPI on the default prim says of hdrusd."""
-    api = UsdMedia.AuthorshipAPI(stage.GetDefaultPrim(), "hdrusd")
+def record(stage: Usd.Stage, name: str = "hdrusd") -> dict[str, Any]:
+    """What a record of the AuthorshipAPI on the default prim says."""
+    api = UsdMedia.AuthorshipAPI(stage.GetDefaultPrim(), name)
     return {
         "package": api.GetSoftwarePackageAttr().Get(),
         "version": api.GetSoftwareVersionAttr().Get(),

@@ -116,3 +116,14 @@ def test_what_is_wrong_is_a_finding(tmp_path: Path, text: str, code: str) -> Non
     source = floor(tmp_path)
     sidecar(tmp_path, text)
     assert code in run(source).report.codes()
+
+
+def test_the_account_leads_back_to_the_entry(tmp_path: Path) -> None:
+    source = floor(tmp_path)
+    sidecar(tmp_path, '[[lamp]]\nat = [[0, 5, 0]]\ncandela = 250\nprovenance = "estimated"\n')
+    result = run(source)
+    (row,) = (row for row in result.lights if row["kind"] == "point")
+    assert row["confidence"] == "low"  # somebody's guess, not a colour without a unit
+    (entry,) = (e for e in result.as_dict()["fix_first"] if e["what"].startswith("Lamp:"))
+    assert entry["write"] is None  # a [[light]] entry would not reach it
+    assert "lamp[1]" in entry["what"]

@@ -51,6 +51,18 @@ def test_what_needs_no_number_is_left_out(changes: dict[str, Any]) -> None:
     assert found(scene) == {}
 
 
+def test_light_points_where_lights_are_may_be_the_same_lamps() -> None:
+    scene = street()
+    heads = np.array([[9.0 * i, 8.1, 0.0] for i in range(3)])
+    scene.lights.append(lamp(name="heads", positions=heads))
+    scene.lights.append(lamp(name="studs", positions=heads - [0.0, 8.0, 0.0]))
+    scene.roots.append(node("strings", lights=[3, 4]))
+    assert found(scene)["light heads"].twin
+    assert not found(scene)["light studs"].twin
+    document = recipe("a", leads(scene, lambda image: None))
+    assert '# match = "heads"\n# enabled = false\n' in document
+
+
 def test_a_level_spot_at_a_cars_height_is_a_headlamp() -> None:
     ahead = lamp(name="a", kind="spot", spot_cutoff=20.0, direction=(1.0, 0.0, 0.0))
     car = node("n", transform=TRS((0.0, 0.7, 0.0)), lights=[0])

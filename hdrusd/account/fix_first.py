@@ -167,7 +167,9 @@ def _lights(scene: Scene) -> Iterator[Entry]:
             write = toml_table("light", pattern, ies="FILE", **stated)
         else:
             write = toml_table("light", pattern, candela=value, **_KEPT[row["confidence"]])
-        yield Entry(share * _DECADES[row["confidence"]], what, why, PHOTOMETRY, write)
+        added = ":lamp[" in (row["rule"] or "")  # the entry that put it there is the place
+        impact = share * _DECADES[row["confidence"]]
+        yield Entry(impact, what, why, PHOTOMETRY, None if added else write)
 
 
 def _held(scene: Scene) -> Iterator[Entry]:

@@ -9,6 +9,7 @@ from pathlib import Path, PurePosixPath
 from typing import Protocol
 
 from hdrusd.errors import InputError, SourceRef
+from hdrusd.importers.unplaced import note_unplaced
 from hdrusd.legacy.scene import LegacyScene
 from hdrusd.registry import Registry
 from hdrusd.report import Kind, Report
@@ -188,4 +189,6 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
         raise InputError(
             resolver.source, f"{suffix or 'no suffix'}: no reader; want {', '.join(SUFFIXES)}"
         )
-    return IMPORTERS[name](resolver, report)
+    scene = IMPORTERS[name](resolver, report)
+    note_unplaced(scene, report)
+    return scene

@@ -13,19 +13,14 @@ src/osgPlugins/osg/BinaryStreamOperator.h.
 
 from __future__ import annotations
 
-import struct
+import re
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.importers.importer import Limits
-from hdrusd.importers.osg_gl import GL_NAMES, value_name
+from hdrusd.importers.osg_bytes import Bytes, DamagedError, Layout
 from hdrusd.importers.osg_layouts import DTYPES, Element, Field, plan
-from hdrusd.importers.osg_text import Block, Document, Statement, decoded
+from hdrusd.importers.osg_text import Block, Document, Statement
 from hdrusd.report import Kind
 
 #: What reads one object; it yields those of the objects inside, whose turn it is then.
@@ -53,7 +48,11 @@ _MODES = (
     *("POINTS", "LINES", "LINE_LOOP", "LINE_STRIP", "TRIANGLES", "TRIANGLE_STRIP", "TRIANGLE_FAN"),
     *("QUADS", "QUAD_STRIP", "POLYGON"),
 )
+#: Key frames of osgAnimation: bytes of a value.
+_KEYS = {"Double": 8, "Float": 4, "Vec2": 8, "Vec3": 12, "Vec4": 16, "Quat": 32, "Matrix": 128}
+_CHANNEL = re.compile(f"({'|'.join(_KEYS)})(Step|Linear|SphericalLinear|CubicBezier)Channel")
 _INLINE_DATA, _INLINE_FILE = 0, 1
+_ZEROS = bytes(64)  # more than fields of a class that may be absent in a row
 _OBJECTS_PER_NODE = 16  # of the limit on nodes: arrays, primitive sets, states
 
 
@@ -65,20 +64,6 @@ class UnknownPartError(Exception):
         super().__init__(text)
 
 
-class _DamagedError(Exception):
-    """Bytes that make no sense."""
-
-
-@dataclass(slots=True)
-class Layout:
-    """What the head of a file says about the rest of it."""
-
-    version: int
-    order: str  # "<" or ">", as in ``struct``
-    sizes: bool  # whether blocks state their size
-    schema: dict[str, list[str]] = field(default_factory=dict)
-
-
 def fill(document: Document, data: bytes, start: int, layout: Layout, limits: Limits) -> None:
     """Read the objects of ``data`` from ``start`` on into the tree of ``document``.
 
@@ -88,25 +73,17 @@ def fill(document: Document, data: bytes, start: int, layout: Layout, limits: Li
     _Objects(document, data, start, layout, limits).run()
 
 
-class _Objects:
+class _Objects(Bytes):
     """One pass over the bytes."""
 
     def __init__(
         self, document: Document, data: bytes, start: int, layout: Layout, limits: Limits
     ) -> None:
+        super().__init__(data, start, layout)
         self.document = document
-        self.data = data
-        self.at = start
-        self.end = len(data)  # of the object that is being read
-        self.layout = layout
         self.limits = limits
         self.count = 0
         self._plans: dict[str, tuple[Field, ...] | None] = {}
-        self._structs: dict[tuple[str, int], struct.Struct] = {}
-        order = layout.order
-        self._uint = struct.Struct(f"{order}I")
-        # block sizes have 8 bytes since version 149
-        self._size = struct.Struct(f"{order}Q" if layout.version > 148 else f"{order}I")
 
     def run(self) -> None:
         """Read the one object that the file is. Raises InputError, UnknownPartError."""
@@ -119,7 +96,7 @@ class _Objects:
                 stack.pop()
                 problem = None
                 continue
-            except (UnknownPartError, _DamagedError) as error:  # for the object around
+            except (UnknownPartError, DamagedError) as error:  # for the object around
                 stack.pop()
                 problem = error
                 continue
@@ -127,7 +104,7 @@ class _Objects:
             stack.append(inner)
             if len(stack) > self.limits.depth:
                 raise self._error(f"objects deeper than {self.limits.depth}")
-        if isinstance(problem, _DamagedError):
+        if isinstance(problem, DamagedError):
             raise self._error(str(problem))
         if problem is not None:
             raise problem
@@ -135,79 +112,23 @@ class _Objects:
     def _error(self, problem: str) -> InputError:
         return InputError(SourceRef(self.document.file, f"byte {self.at}"), problem)
 
-    # -- numbers and text ------------------------------------------------------------------
-
-    def _advance(self, count: int) -> int:
-        """Where ``count`` bytes begin, which are passed."""
-        begin = self.at
-        if count > self.end - begin:
-            raise _DamagedError(f"{count} bytes wanted, {max(self.end - begin, 0)} are left")
-        self.at = begin + count
-        return begin
-
-    def _number(self) -> int:
-        begin = self._advance(4)
-        return int(self._uint.unpack_from(self.data, begin)[0])
-
-    def _flag(self) -> bool:
-        return self.data[self._advance(1)] != 0
-
-    def _text(self) -> str:
-        count = self._number()
-        begin = self._advance(count)
-        return decoded(self.data[begin : begin + count])
-
-    def _open(self) -> int:
-        """Begin a block; where it ends, or where the one around it does if it has no size."""
-        if not self.layout.sizes:
-            return self.end
-        begin = self._advance(self._size.size)
-        end = begin + int(self._size.unpack_from(self.data, begin)[0])
-        if not self.at <= end <= self.end:
-            raise _DamagedError(f"a block up to byte {end}; want byte {self.at} to {self.end}")
-        return end
-
-    def _view(self, code: str, width: int, count: int) -> Block:
-        """A block of ``count`` rows of numbers, which stay where they are."""
-        dtype = np.dtype(self.layout.order + DTYPES[code])
-        begin = self._advance(dtype.itemsize * width * count)
-        values = np.frombuffer(self.data, dtype, width * count, begin)
-        if code == "b":
-            text = np.full(2 * len(values), ord(" "), np.uint8)
-            text[::2] = np.where(values, ord("1"), ord("0"))
-            return Block(raw=text.tobytes())
-        return Block(values=values)
-
-    def _words(self, element: Element) -> list[str]:
-        """Numbers as the text form has them."""
-        key = element.code, element.count
-        reader = self._structs.get(key)
-        if reader is None:
-            letter = {"b": "B", "c": "b", "C": "B", "g": "I", "v": "i", "e": "i"}
-            code = letter.get(element.code, element.code)
-            reader = struct.Struct(f"{self.layout.order}{element.count}{code}")
-            self._structs[key] = reader
-        values = reader.unpack_from(self.data, self._advance(reader.size))
-        if element.names is not None:
-            return [element.names.get(value, str(value)) for value in values]
-        return [_WORDS.get(element.code, str)(value) for value in values]
-
     # -- objects ---------------------------------------------------------------------------
 
     def _object(self, block: Block) -> Reader:
         """Read an object, or a reference to one, into a block."""
         start = self.at
-        label = self._text()
+        label = self.text()
         statement = Statement([label], start)
         block.statements.append(statement)
         if label == "NULL":
             return
-        end = self._open()
-        number = str(self._number())
-        inner = Block([Statement(["UniqueID", number], start)])
+        end = self.open()
+        number = str(self.number())
+        inner = Block()
         statement.block = inner
         definitions = self.document.definitions
         if number in definitions:
+            inner.statements.append(Statement(["UniqueID", number], start))
             self.at = end if self.layout.sizes else self.at
             return
         if self.layout.sizes and self.at == end:  # inside something that was passed over
@@ -221,11 +142,11 @@ class _Objects:
         outer, self.end = self.end, end
         try:
             yield from self._fields(label, inner)
-        except (UnknownPartError, _DamagedError) as problem:
+        except (UnknownPartError, DamagedError) as problem:
             if not self.layout.sizes:
                 raise
             text = f"{problem}; {end - self.at} bytes are passed over"
-            kind = Kind.INVALID if isinstance(problem, _DamagedError) else Kind.DROPPED
+            kind = Kind.INVALID if isinstance(problem, DamagedError) else Kind.DROPPED
             self.document.add(kind, "osg-unread", statement, label, text)
         self.end = outer
         if self.layout.sizes:
@@ -239,22 +160,33 @@ class _Objects:
         if fields is None:
             raise UnknownPartError(self.at, f"{label} is no class that is known here")
         statements = block.statements
-        for name, optional, layout in fields:
-            if optional and not self._flag():
+        data, passed = self.data, 0
+        for name, optional, layout, absent, skipped in fields:
+            if passed:
+                passed -= 1
+                continue
+            if skipped:
+                self.advance(skipped)
+                continue
+            if absent > 1 and data.startswith(_ZEROS[:absent], self.at, self.end):
+                self.at += absent
+                passed = absent - 1
+                continue
+            if optional and not self.flag():
                 continue
             place = self.at
             code = layout[0].code if layout else ""
             if code == "O":
-                if self._flag():
+                if self.flag():
                     inner = Block()
                     statements.append(Statement([name, "TRUE"], place, inner))
                     yield self._object(inner)
             elif code == "s" and len(layout) == 1:
-                text = self._text()
+                text = self.text()
                 if text:
                     statements.append(Statement([name, text], place))
             elif code in DTYPES and len(layout) == 1:
-                statements.append(Statement([name, *self._words(layout[0])], place))
+                statements.append(Statement([name, *self.words(layout[0])], place))
             elif code == "[":
                 yield from self._vector(name, layout[0].inside[0], statements)
             elif code == "!":
@@ -265,12 +197,12 @@ class _Objects:
                 yield from self._layout(layout, line, block)
 
     def _vector(self, name: str, item: Element, statements: list[Statement]) -> Reader:
-        place, count = self.at, self._number()
+        place, count = self.at, self.number()
         if not count:
             return
         line = Statement([name, str(count)], place, Block())
         if item.code in DTYPES:
-            line.block = self._view(item.code, item.count, count)
+            line.block = self.view(item.code, item.times, count)
             statements.append(line)
             return
         statements.append(line)
@@ -279,12 +211,12 @@ class _Objects:
     def _items(self, count: int, layout: tuple[Element, ...], line: Statement) -> Reader:
         """Read ``count`` times what a layout says, into a block of ``line``."""
         if len(layout) == 1 and layout[0].code in DTYPES:
-            line.block = self._view(layout[0].code, layout[0].count, count)
+            line.block = self.view(layout[0].code, layout[0].times, count)
             return
         line.block = block = Block()
         sizes = [element.size for element in layout]
         if None not in sizes and "g" not in [element.code for element in layout]:
-            self._advance(count * sum(filter(None, sizes)))  # rows of several types; nobody's
+            self.advance(count * sum(filter(None, sizes)))  # rows of several types; nobody's
             return
         for _ in range(count):
             if layout[0].code == "o":
@@ -303,7 +235,7 @@ class _Objects:
                 line = Statement([element.word] if code == ":" else [], self.at)
                 block.statements.append(line)
             if code in DTYPES:
-                line.words += self._words(element)
+                line.words += self.words(element)
             elif code == "=":
                 line.words.append(element.word)
             elif code in "nN{":
@@ -314,11 +246,11 @@ class _Objects:
     def _group(self, element: Element, line: Statement) -> Reader:
         count = None
         if element.code != "{":
-            count = self._number()
+            count = self.number()
             line.words.append(str(count))
             if element.code == "N" and not count:
                 return
-        self._open()
+        self.open()
         if count is not None:
             yield from self._items(count, element.inside, line)
             return
@@ -336,103 +268,130 @@ class _Objects:
         yield self._object(line.block)
 
     def _optional_object(self, line: Statement) -> Reader:
-        present = self._flag()
+        present = self.flag()
         line.words.append("TRUE" if present else "FALSE")
         if present:
             yield from self._bare_object(line)
 
     def _bracketed_object(self, line: Statement) -> Reader:
-        present = self._flag()
+        present = self.flag()
         line.words.append("TRUE" if present else "FALSE")
         if present:
-            self._open()
+            self.open()
             yield from self._bare_object(line)
 
     def _string(self, line: Statement) -> Reader:
-        line.words.append(self._text())
+        line.words.append(self.text())
         yield from ()
 
     def _optional_string(self, line: Statement) -> Reader:
-        present = self._flag()
-        line.words += ["TRUE", self._text()] if present else ["FALSE"]
+        present = self.flag()
+        line.words += ["TRUE", self.text()] if present else ["FALSE"]
         yield from ()
 
     def _matrix(self, line: Statement) -> Reader:
-        self._open()
-        line.block = self._view("d", 16, 1)
+        self.open()
+        line.block = self.view("d", 16, 1)
         yield from ()
 
     def _bytes(self, line: Statement) -> Reader:
-        line.block = self._view("C", 1, self._number())
+        line.block = self.view("C", 1, self.number())
         yield from ()
 
     def _optional_array(self, line: Statement) -> Reader:
-        present = self._flag()
+        present = self.flag()
         line.words.append("TRUE" if present else "FALSE")
         if present:
             yield from self._array(line)
 
     def _array(self, line: Statement) -> Reader:
         """An array that is no object: ``ArrayID 2 Vec3fArray 40 {`` in the text form."""
-        number = str(self._number())
+        number = str(self.number())
         line.words += ["ArrayID", number]
         if f"ArrayID {number}" in self.document.definitions:
             return
-        kind = self._number()
+        kind = self.number()
         if kind >= len(_ARRAY_TYPES):
             raise UnknownPartError(self.at, f"array of type {kind}; want 0 to 31")
-        name, count = _ARRAY_TYPES[kind], self._number()
+        name, count = _ARRAY_TYPES[kind], self.number()
         line.words += [name, str(count)]
-        self._open()
+        self.open()
         width, code = 1, _SCALARS.get(name.removesuffix("Array"), name[0].lower())
         if name.startswith("Vec"):
             width, code = int(name[3]), _LETTERS[name[4:].removesuffix("Array")]
-        line.block = self._view(code, width, count)
+        line.block = self.view(code, width, count)
         self.document.definitions[f"ArrayID {number}"] = line
         yield from ()
 
     def _primitive_set(self, line: Statement) -> Reader:
         """A primitive set that is no object: ``DrawArrays GL_TRIANGLES 0 0 36`` as text."""
-        kind, mode = self._number(), self._number()
+        kind, mode = self.number(), self.number()
         if kind not in _SETS:
             raise UnknownPartError(self.at, f"primitive set of type {kind}; want 50 to 54")
         name, code = _SETS[kind]
         line.words += [name, f"GL_{_MODES[mode]}" if mode < len(_MODES) else str(mode)]
         if self.layout.version > 96:
-            line.words.append(str(self._number()))  # instances
+            line.words.append(str(self.number()))  # instances
         if kind in (50, 51):
-            line.words += self._words(Element("i"))
+            line.words += self.words(Element("i"))
         if code is None:
-            line.words += self._words(Element("i"))
+            line.words += self.words(Element("i"))
             return
-        count = self._number()
+        count = self.number()
         line.words.append(str(count))
-        self._open()
-        line.block = self._view(code, 1, count)
+        self.open()
+        line.block = self.view(code, 1, count)
+        yield from ()
+
+    def _channel(self, line: Statement) -> Reader:
+        """A channel of an osgAnimation::Animation, which is passed over."""
+        kind = self.text()
+        line.words.append(kind)
+        self.open()
+        found = _CHANNEL.fullmatch(kind)
+        if found is None:
+            raise UnknownPartError(self.at, f"animation channel {kind} is not known here")
+        for _ in ("name", "name of the target"):
+            self.text()
+        if self.flag():
+            count = self.number()
+            self.open()
+            value = _KEYS[found[1]] * (3 if found[2] == "CubicBezier" else 1)
+            if found[1] == "Matrix" and self.layout.sizes:
+                value += self.size.size
+            self.advance(count * (8 + value))
+        yield from ()
+
+    def _shown_text(self, line: Statement) -> Reader:
+        """The text of an osgText::Text; one of other than Latin letters is an array."""
+        if not self.flag():
+            raise UnknownPartError(self.at, "text of other letters is not known here")
+        line.words.append(self.text())
         yield from ()
 
     # -- images ------------------------------------------------------------------------------
 
     def _optional_image(self, line: Statement) -> Reader:
-        present = self._flag()
+        present = self.flag()
         line.words.append("TRUE" if present else "FALSE")
         if present:
             yield from self._image(line)
 
     def _bracketed_image(self, line: Statement) -> Reader:
-        present = self._flag()
+        present = self.flag()
         line.words.append("TRUE" if present else "FALSE")
         if present:
-            self._open()
+            self.open()
             yield from self._image(line)
 
     def _image(self, line: Statement) -> Reader:
         """An image; its bytes stay where they are."""
         place = self.at
-        label = self._text() if self.layout.version > 94 else "osg::Image"
-        number = str(self._number())
-        line.block = inner = Block([Statement(["UniqueID", number], place)])
+        label = self.text() if self.layout.version > 94 else "osg::Image"
+        number = str(self.number())
+        line.block = inner = Block()
         if number in self.document.definitions:
+            inner.statements.append(Statement(["UniqueID", number], place))
             return
         self.document.definitions[number] = line
 
@@ -442,34 +401,27 @@ class _Objects:
             return statement
 
         add("ClassName", label)
-        add("FileName", self._text())
-        hint, how = self._number(), self._number()
+        add("FileName", self.text())
+        hint, how = self.number(), self.number()
         add("WriteHint", str(hint), str(how))
         if how == _INLINE_DATA:
-            add("Origin", str(self._number()))
-            add("Size", *self._words(Element("i", 3)))
+            add("Origin", str(self.number()))
+            add("Size", *self.words(Element("i", 3)))
             for name in ("InternalTextureFormat", "PixelFormat", "DataType", "Packing"):
-                add(name, *self._words(Element("i")))
-            self._number()  # how the memory was allocated
+                add(name, *self.words(Element("i")))
+            self.number()  # how the memory was allocated
         if how in (_INLINE_DATA, _INLINE_FILE):
-            count = self._number()
-            begin = self._advance(count)
+            count = self.number()
+            begin = self.advance(count)
             if count:
                 held = add("Data" if how == _INLINE_DATA else "InlineFile", str(count))
                 held.block = Block(data=memoryview(self.data)[begin : self.at])
         if how == _INLINE_DATA:
-            self._advance(4 * self._number())  # where the smaller levels begin
+            self.advance(4 * self.number())  # where the smaller levels begin
         # what an image has beyond that is written by the program, whatever its class
         yield from self._fields("osg::Object", inner)
 
 
-_WORDS: dict[str, Callable[[Any], str]] = {
-    "b": lambda value: "TRUE" if value else "FALSE",
-    "f": lambda value: str(np.float32(value)),  # the shortest that is this number
-    "d": repr,
-    "g": lambda value: GL_NAMES.get(value, str(value)),
-    "v": value_name,
-}
 _SPECIAL: dict[str, Callable[[_Objects, Statement], Reader]] = {
     "o": _Objects._bare_object,
     "O": _Objects._optional_object,
@@ -481,6 +433,8 @@ _SPECIAL: dict[str, Callable[[_Objects, Statement], Reader]] = {
     "a": _Objects._optional_array,
     "A": _Objects._array,
     "p": _Objects._primitive_set,
+    "K": _Objects._channel,
+    "T": _Objects._shown_text,
     "m": _Objects._image,
     "Y": _Objects._optional_image,
     "Z": _Objects._bracketed_image,

@@ -12,7 +12,8 @@ AnimationPath(Object) TimeControlPointMap:?N{=Time,d,{Position:3d,Rotation:4d,Sc
 AnimationPathCallback(Object NodeCallback) AnimationPath:O PivotPoint:3d UseInverseMatrix:b
   TimeOffset:d TimeMultiplier:d Pause:b
 Array(Object BufferData@147-) Binding:e(-1=BIND_UNDEFINED/0=BIND_OFF/1=BIND_OVERALL/
-  2=BIND_PER_PRIMITIVE_SET/3=BIND_PER_PRIMITIVE/4=BIND_PER_VERTEX) Normalize:b PreserveDataType:b
+  2=BIND_PER_PRIMITIVE_SET/3=BIND_PER_PRIMITIVE/4=BIND_PER_VERTEX) Normalize:-b
+  PreserveDataType:-b
 AtomicCounterBufferBinding(Object StateAttribute BufferIndexBinding)
 AudioSink(Object)
 AudioStream(Object)
@@ -90,9 +91,9 @@ DrawElementsUShort(Object BufferData@147- PrimitiveSet) vector:[H]
 DrawIndirectBufferObject(Object BufferObject)
 DrawPixels(Object Node@154- Drawable) Position:3f Image:Y UseSubImage:b Area:?4I
 Drawable(Object Node@154-) StateSet@-155:O InitialBound:?{Minimum:3d,Maximum:3d}
-  ComputeBoundingBoxCallback:O Shape:O SupportsDisplayList:b UseDisplayList:b
-  UseVertexBufferObjects:b UpdateCallback@-155:O EventCallback@-155:O CullCallback@-155:O
-  DrawCallback@-155:O NodeMask@142-:I CullingActive@145-:b
+  ComputeBoundingBoxCallback:O Shape:O SupportsDisplayList:-b UseDisplayList:-b
+  UseVertexBufferObjects:-b UpdateCallback@-155:O EventCallback@-155:O CullCallback@-155:O
+  DrawCallback@-155:O NodeMask@142-:I CullingActive@145-:-b
 ElementBufferObject(Object BufferObject)
 EllipsoidModel(Object) RadiusEquator:d RadiusPolar:d
 FloatArray(Object BufferData@147- Array) vector:[f]
@@ -152,11 +153,11 @@ MultiDrawElementsIndirectUShort(Object BufferData@147- PrimitiveSet DrawElements
   DrawElementsIndirectUShort) NumCommandsToDraw:I
 Multisample(Object StateAttribute) Coverage:f Invert:b Hint:i
 Node(Object) InitialBound:?{Center:3d,Radius:d} ComputeBoundingSphereCallback:O UpdateCallback:O
-  EventCallback:O CullCallback:O CullingActive:b NodeMask:I Descriptions@-76:?n{s} StateSet:O
+  EventCallback:O CullCallback:O CullingActive:-b NodeMask:I Descriptions@-76:?n{s} StateSet:O
 NodeCallback(Object Callback)
 NodeTrackerCallback(Object NodeCallback) TrackNode:O
 NodeVisitor(Object) TraversalMode:i VisitorType:i TraversalMask:I TraversalNumber:I
-Object() Name:s DataVariance:i UserData@-76:?{o} UserDataContainer@77-:O
+Object() Name:s DataVariance:-i UserData@-76:?{o} UserDataContainer@77-:O
 OccluderNode(Object Node Group) Occluder:O
 OcclusionQueryNode(Object Node Group) QueriesEnabled:b VisibilityThreshold:I QueryFrameCount:I
   DebugDisplay:b
@@ -175,7 +176,7 @@ PolygonStipple(Object StateAttribute) Mask:?r
 PositionAttitudeTransform(Object Node Group Transform) Position:3d Attitude:4d Scale:3d
   PivotPoint:3d
 PrimitiveRestartIndex(Object StateAttribute) RestartIndex:?I
-PrimitiveSet(Object BufferData@147-) NumInstances:i Mode:e(0=POINTS/1=LINES/2=LINE_LOOP/
+PrimitiveSet(Object BufferData@147-) NumInstances:-i Mode:e(0=POINTS/1=LINES/2=LINE_LOOP/
   3=LINE_STRIP/4=TRIANGLES/5=TRIANGLE_STRIP/6=TRIANGLE_FAN/7=QUADS/8=QUAD_STRIP/9=POLYGON/
   10=LINES_ADJACENCY/11=LINE_STRIP_ADJACENCY/12=TRIANGLES_ADJACENCY/13=TRIANGLE_STRIP_ADJACENCY/
   14=PATCHES)
@@ -205,7 +206,7 @@ Sphere(Object Shape) Center:3f Radius:f
 StateAttribute(Object) UpdateCallback:O EventCallback:O
 StateSet(Object) ModeList:?N{g,v} AttributeList:?N{o,Value:v} TextureModeList:?n{=Data,N{g,v}}
   TextureAttributeList:?n{=Data,N{o,Value:v}} UniformList:?n{o,Value:v} RenderingHint:i
-  RenderBinMode:i BinNumber:i BinName:s NestRenderBins:b UpdateCallback:O EventCallback:O
+  RenderBinMode:-i BinNumber:-i BinName:s NestRenderBins:-b UpdateCallback:O EventCallback:O
   DefineList@151-:?n{s,s,Value:v}
 Stencil(Object StateAttribute) Function:i FunctionRef:i FunctionMask:I StencilFailOperation:i
   StencilPassAndDepthFailOperation:i StencilPassAndDepthPassOperation:i WriteMask:I
@@ -226,15 +227,15 @@ TexEnvCombine(Object StateAttribute) Combine_RGB:g Combine_Alpha:g Source0_RGB:g
 TexEnvFilter(Object StateAttribute) LodBias:f
 TexGen(Object StateAttribute) Mode:i PlaneS:?4d PlaneT:?4d PlaneR:?4d PlaneQ:?4d
 TexGenNode(Object Node Group) TextureUnit:I TexGen:O ReferenceFrame:i
-TexMat(Object StateAttribute) Matrix:M ScaleByTextureRectangleSize:b
+TexMat(Object StateAttribute) Matrix:M ScaleByTextureRectangleSize:-b
 Texture(Object StateAttribute) WRAP_S:?g WRAP_T:?g WRAP_R:?g MIN_FILTER:?g MAG_FILTER:?g
-  MaxAnisotropy:f UseHardwareMipMapGeneration:b UnRefImageDataAfterApply:b ClientStorageHint:b
-  ResizeNonPowerOfTwoHint:b BorderColor:4d BorderWidth:i InternalFormatMode:i InternalFormat:?g
-  SourceFormat:?g SourceType:?g ShadowComparison:b ShadowCompareFunc:i ShadowTextureMode:i
-  ShadowAmbient:f ImageAttachment@95-153:?I,i,C,i,I,I Swizzle@98-:?s MinLOD@155-:f MaxLOD@155-:f
-  LODBias@155-:f
+  MaxAnisotropy:-f UseHardwareMipMapGeneration:-b UnRefImageDataAfterApply:-b
+  ClientStorageHint:-b ResizeNonPowerOfTwoHint:-b BorderColor:-4d BorderWidth:-i
+  InternalFormatMode:-i InternalFormat:?g SourceFormat:?g SourceType:?g ShadowComparison:-b
+  ShadowCompareFunc:-i ShadowTextureMode:-i ShadowAmbient:-f ImageAttachment@95-153:?I,i,C,i,I,I
+  Swizzle@98-:?s MinLOD@155-:-f MaxLOD@155-:-f LODBias@155-:-f
 Texture1D(Object StateAttribute Texture) Image:Y TextureWidth:i
-Texture2D(Object StateAttribute Texture) Image:Y TextureWidth:i TextureHeight:i
+Texture2D(Object StateAttribute Texture) Image:Y TextureWidth:-i TextureHeight:-i
 Texture2DArray(Object StateAttribute Texture) Images:?n{m} TextureWidth:i TextureHeight:i
   TextureDepth:i
 Texture2DMultisample(Object StateAttribute Texture) TextureWidth:i TextureHeight:i NumSamples:i

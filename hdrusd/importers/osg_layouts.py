@@ -7,7 +7,8 @@ hold. A line of a table, which goes on where the next one is indented:
     LOD(Object Node Group) CenterMode:i UserCenter:?4d RangeList:?n{2f}
 
 A base or field may hold in some versions of the format only: ``StateSet@-155``, ``NodeMask@142-``.
-``?`` is a field behind a byte that says whether it is there. Then, after a number that repeats it,
+``?`` is a field behind a byte that says whether it is there, ``-`` one that nothing here reads and
+that does not become part of the tree. Then, after a number that repeats it,
 
     b  c C  h H  i I  q Q  f d    boolean, integers of 1 to 8 bytes (signed first), floating point
     e(0=NAME/1=NAME)  g  v        enumeration, OpenGL's, value of a mode, 4 bytes each
@@ -19,6 +20,7 @@ A base or field may hold in some versions of the format only: ``StateSet@-155``,
     [x]  n{x,y}  N{x,y}  {x,y}    counted values; in brackets; the same, without brackets if none;
                                   brackets alone
     =Word  Name:                  in the text form: a word, the begin of a line
+    K  T                          animation channel, shown text
     !                             not known here
 
 Sources: OpenSceneGraph 3.6, include/osgDB/Serializer, src/osgDB/ObjectWrapper.cpp.
@@ -44,18 +46,16 @@ _TOKEN = re.compile(
     r"|\[(?P<vector>\d*[a-zA-Z])\]|(?P<times>\d*)(?P<code>[a-zA-Z!])"
 )
 
-#: Codes of values of one size to NumPy's names of them, without the byte order.
-DTYPES = {
-    **{"b": "u1", "c": "i1", "C": "u1", "h": "i2", "H": "u2", "i": "i4", "I": "u4"},
-    **{"q": "i8", "Q": "u8", "f": "f4", "d": "f8", "g": "u4", "v": "i4", "e": "i4"},
-}
+#: Codes of values of one size and NumPy's names of them, without the byte order.
+_TYPES = "b=u1 c=i1 C=u1 h=i2 H=u2 i=i4 I=u4 q=i8 Q=u8 f=f4 d=f8 g=u4 v=i4 e=i4"
+DTYPES = {code: dtype for code, _, dtype in (pair.partition("=") for pair in _TYPES.split())}
 
 
 class Element(NamedTuple):
-    """One part of a layout; ``code`` is a letter above, ``[``, ``{``, ``n``, ``N``, ``=``, ``:``."""
+    """One part of a layout; ``code`` is its letter, or ``[``, ``{``, ``=``, ``:``."""
 
     code: str
-    count: int = 1
+    times: int = 1
     word: str = ""
     names: dict[int, str] | None = None
     inside: tuple[Element, ...] = ()
@@ -64,15 +64,21 @@ class Element(NamedTuple):
     def size(self) -> int | None:
         """Bytes; None where that is not the same for all."""
         dtype = DTYPES.get(self.code)
-        return None if dtype is None else int(dtype[1]) * self.count
+        return None if dtype is None else int(dtype[1]) * self.times
 
 
 class Field(NamedTuple):
-    """A field of a class in one version."""
+    """A field of a class in one version, or several that are passed over.
+
+    ``absent``: how many fields from this one on are behind a byte that may be 0. ``skipped``:
+    bytes of fields that nothing here reads.
+    """
 
     name: str
     optional: bool
     layout: tuple[Element, ...]
+    absent: int = 0
+    skipped: int = 0
 
 
 class Declared(NamedTuple):
@@ -101,12 +107,30 @@ def plan(label: str, version: int, schema: dict[str, list[str]]) -> tuple[Field,
         if name in schema:
             own = [field for word in schema[name] for field in own if field.name == word]
         fields += [_field(f) for f in own if f.first <= version <= f.last]
-    return tuple(fields)
+    return tuple(_joined(fields))
 
 
 def _field(declared: Declared) -> Field:
+    layout = _parse(declared.layout.lstrip("?-"))
+    if declared.layout.startswith("-"):
+        return Field(declared.name, False, layout, skipped=sum(e.size or 0 for e in layout))
     optional = declared.layout.startswith("?")
-    return Field(declared.name, optional, _parse(declared.layout.removeprefix("?")))
+    flagged = optional or (len(layout) == 1 and layout[0].code == "O")
+    return Field(declared.name, optional, layout, absent=int(flagged))
+
+
+def _joined(fields: list[Field]) -> list[Field]:
+    """Fields to pass over as one, and the numbers of those in a row that may be absent."""
+    made: list[Field] = []
+    for field in reversed(fields):
+        after = made[-1] if made else None
+        if after is not None and field.skipped and after.skipped:
+            made[-1] = field._replace(skipped=field.skipped + after.skipped)
+        elif after is not None and field.absent:
+            made.append(field._replace(absent=1 + after.absent))
+        else:
+            made.append(field)
+    return made[::-1]
 
 
 @cache

@@ -41,7 +41,7 @@ osgAnimation::ActionAnimation(Object osgAnimation::Action)
 osgAnimation::ActionBlendIn(Object osgAnimation::Action)
 osgAnimation::ActionBlendOut(Object osgAnimation::Action)
 osgAnimation::ActionStripAnimation(Object osgAnimation::Action)
-osgAnimation::Animation(Object) Duration:d Weight:f StartTime:d PlayMode:i Channels:?!
+osgAnimation::Animation(Object) Duration:d Weight:f StartTime:d PlayMode:i Channels:?n{=Type,K}
 osgAnimation::AnimationManagerBase(Object NodeCallback) Animations:?n{o} AutomaticLink:b
 osgAnimation::BasicAnimationManager(Object NodeCallback osgAnimation::AnimationManagerBase)
 osgAnimation::Bone(Object Node Group Transform MatrixTransform) InvBindMatrixInSkeletonSpace:M
@@ -156,7 +156,7 @@ osgText::Text(Object Node@154- Drawable osgText::TextBase) Color:4f BackdropType
 osgText::Text3D(Object Node@154- Drawable osgText::TextBase) CharacterDepth:f RenderMode:i
   Color@68-:4f
 osgText::TextBase(Object Node@154- Drawable) Font:?s FontSize:?2I CharacterSize:?2f
-  CharacterSizeMode:i MaximumWidth:f MaximumHeight:f LineSpacing:f Text:?! Position:3f
+  CharacterSizeMode:i MaximumWidth:f MaximumHeight:f LineSpacing:f Text:?T Position:3f
   Alignment:i AxisAlignment:i Rotation:4d AutoRotateToScreen:b Layout:i DrawMode:i
   BoundingBoxMargin:f BoundingBoxColor:4f
 """

@@ -2,8 +2,8 @@
 
 What a file leaves out: .osg is written in full, so the values of osg::Light's
 constructor stand in. The writer of .osgt leaves out a value that equals its
-serializer's default, which for the colours is 0 0 0 0 and for the rest
-OpenGL's default, so that is what is read; the fields are listed in
+serializer's default, which is 0 for the colours, the position and the direction
+and OpenGL's default for the rest, so that is what is read; the fields are listed in
 ``extras["defaults"]``. (osgconv reads the constructor's 0.05, 0.8, 0.05 there, and
 so changes a light that it wrote itself.)
 
@@ -35,6 +35,7 @@ _DEFAULTS: dict[str, tuple[float, ...]] = {
     "spotcutoff": (180.0,),
 }
 _COLOURS = ("ambient", "diffuse", "specular")
+_ZERO = (*_COLOURS, "position", "direction")  # what .osgt leaves out where it is 0
 _NO_SPOT = 180.0
 
 
@@ -72,7 +73,7 @@ class LightReader:
             found = document.numbers(place, len(default), key)
             if found is None:
                 left_out.append(key)
-                found = (0.0,) * 4 if document.new and key in _COLOURS else default
+                found = (0.0,) * len(default) if document.new and key in _ZERO else default
             values[key] = found
         missing = [key for key in _COLOURS if key in left_out]
         if missing:

@@ -21,6 +21,7 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +106,7 @@ class Block:
         return np.array([_number(word) for words in lines for word in words], dtype=np.float64)
 
 
+@lru_cache(4096)
 def fold(word: str) -> str:
     """The name of a field as both formats have it: ``wrap_s`` and ``WRAP_S`` are ``wraps``."""
     return word.replace("_", "").lower()

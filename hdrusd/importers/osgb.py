@@ -16,7 +16,8 @@ import zlib
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.importers import osg, osgconv
 from hdrusd.importers.importer import Resolver
-from hdrusd.importers.osg_binary import Layout, UnknownPartError, fill
+from hdrusd.importers.osg_binary import UnknownPartError, fill
+from hdrusd.importers.osg_bytes import Layout
 from hdrusd.importers.osg_text import Document
 from hdrusd.legacy.scene import LegacyScene
 from hdrusd.report import Kind, Report

@@ -80,11 +80,12 @@ def _convert(program: str, folder: Path, resolver: Resolver) -> str:
     """One run of osgconv; what it printed. It ends well whatever happened."""
     name = f"source{resolver.source.suffix.lower()}"
     return worker.run(
-        [program, "-O", "ForceReadingImage=true", name, "source.osgt"],
+        [program, "-O", "ForceReadingImage=true PRECISION 17", name, "source.osgt"],
         folder=folder,
         limits=resolver.limits,
         source=resolver.source,
         reader="osgconv",
+        environment={"OSG_OPTIMIZER": "OFF"},  # which flattens transforms and merges nodes
     )
 
 

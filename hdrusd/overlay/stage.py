@@ -260,7 +260,7 @@ class Overlay:
         default = self.stage.GetDefaultPrim()
         if default and self.layer.rootPrims:
             inputs = authorship_inputs(self.source, self.sidecar.path)
-            write_authorship(self.layer, default.GetPath(), inputs)
+            write_authorship(self.layer, default.GetPath(), inputs, default)
         root = Sdf.Layer.CreateNew(str(self.folder / self.output.name))
         copy_stage_metadata(self.stage.GetRootLayer(), root)
         way = os.path.relpath(self.source.resolve(), self.output.parent.resolve())

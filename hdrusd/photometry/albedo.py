@@ -32,10 +32,12 @@ BRIGHTEST, DARKEST = 0.9, 0.02
 #: How far beyond a bound is still on it: codes of 8 bits are steps of 2.2/255 at white.
 _SLACK = 0.01
 
-_OKE = "Oke 1987, Boundary Layer Climates, tables 1.1 and 7.4"
-_IES = "IESNA Lighting Handbook, 9th ed. (2000), reflectances of outside surfaces"
+#: "Unconfirmed": nobody has read that source.
+_OKE = "Oke 1987, Boundary Layer Climates, tables 1.1 and 7.4, unconfirmed"
+_IES = "IESNA Lighting Handbook, 9th ed. (2000), outside surfaces, unconfirmed"
+_PON = "Pon 1999, Pavement albedo"
 _MCCAMY = "McCamy, Marcus and Davidson 1976, A color-rendition chart"
-_EN1436 = "EN 1436:2018, luminance factor beta"
+_EN1436 = "EN 1436:2018, luminance factor beta, unconfirmed"
 _LEKNER = "half of dry, Lekner and Dorf 1988, Why some things are darker when wet"
 
 
@@ -116,7 +118,7 @@ CLASSES: tuple[SurfaceClass, ...] = (
         "asphalt",
         0.04,
         0.20,
-        _OKE + "; " + _IES + " (new 0.04, old 0.12, macadam 0.18)",
+        _PON + " (new 0.04, old 0.12); " + _OKE + "; " + _IES + " (macadam 0.18)",
         "asphalt, tarmac, road, roads, street, bitumen, macadam, highway, motorway, roadway,"
         " blacktop, carriageway, parking lot, runway, strasse, fahrbahn, autobahn, route,"
         " chaussee, enrobe, bitume, carretera, calzada, asfalto, strada, carreggiata",
@@ -125,7 +127,7 @@ CLASSES: tuple[SurfaceClass, ...] = (
         "concrete",
         0.10,
         0.55,
-        _OKE + "; " + _IES + " (0.40; new white 0.55)",
+        _PON + " (new 0.55); " + _OKE + "; " + _IES + " (0.40)",
         "concrete, cement, sidewalk, pavement, kerb, curb, beton, zement, gehweg, bordstein,"
         " ciment, trottoir, bordure, hormigon, cemento, acera, bordillo, calcestruzzo,"
         " marciapiede",

@@ -35,7 +35,7 @@ BY_PICTURE = "R = "
 BY_LETTER = "Usd"
 
 #: A ``rule`` that names a place in a photometry file: somebody's own number.
-_STATED = re.compile(r":(light|material)\[\d+\]|:ambient")
+_STATED = re.compile(r":(light|lamp|material)\[\d+\]|:ambient")
 
 
 def confidence(

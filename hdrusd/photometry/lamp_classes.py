@@ -2,7 +2,7 @@
 
 What a rule demands of a kind of lamp bounds it from both sides; ``typical`` lies between.
 Nothing here is used by a conversion unless it is written into a photometry file, with
-``source`` and provenance "estimated".
+``source`` and provenance "estimated". "Unconfirmed": nobody has read that source.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ _R6 = "UN Regulation 6 (148)"
 _R38 = "UN Regulation 38 (148)"
 _R23 = "UN Regulation 23 (148)"
 _EN12368 = "EN 12368, performance levels 1 to 3 of 200 and 300 mm signals"
-_EN12899 = "EN 12899-1, luminance of white, classes L1 to L3"
-_PLG05 = "Institution of Lighting Professionals, PLG05, zones E2 to E4"
-_EN1838 = "EN 1838 and ISO 3864-1, safety signs with a lamp inside"
-_EU874 = "Regulation (EU) 874/2012, table of claimed equivalence, 25 to 100 W"
-_EN60081 = "EN 60081, 36 W, 3350 lm of 26 mm x 1.2 m: Phi / (pi S)"
-_EU245 = "Regulation (EC) 245/2009, 50 to 250 W of high-pressure sodium at its least efficacy"
+_EN12899 = "EN 12899-1, luminance of white, classes L1 to L3, unconfirmed"
+_PLG05 = "Institution of Lighting Professionals, PLG05, zones E2 to E4, unconfirmed"
+_EN1838 = "EN 1838 (green in an emergency) and DIN 4844-1 (white on mains)"
+_EU244 = "Regulation (EC) 244/2009, annex II, table of claimed equivalence, 25 to 100 W"
+_EN60081 = "EN 60081, 36 W, 3350 lm, unconfirmed, of 26 mm x 1.2 m: Phi / (pi S)"
+_EU245 = "Regulation (EC) 245/2009, 50 to 250 W of high-pressure sodium, unconfirmed"
 _ICAO = "ICAO Annex 14, vol. I, table 6-1, types A and B"
 
 #: Red and amber of signal lamps, linear Rec. 709 (UN Regulation 48, 2.29: within their corners).
@@ -60,7 +60,7 @@ LAMP_CLASSES: tuple[LampClass, ...] = (
         10_100.0,
         5_100.0,
         44_100.0,
-        f"{_R112}, passing beam: 50V, 75R",
+        f"{_R112}, passing beam: 50V, 75R; most: UN Regulation 123, class C",
         ("low beam", "lowbeam", "dipped beam", "headlight", "headlamp", "abblendlicht"),
         "halogen-vehicle",
     ),
@@ -188,7 +188,7 @@ LAMP_CLASSES: tuple[LampClass, ...] = (
         806.0,
         249.0,
         1521.0,
-        _EU874,
+        _EU244,
         ("bulb", "lightbulb", "ceiling lamp", "table lamp", "gluehbirne"),
         "led",
     ),

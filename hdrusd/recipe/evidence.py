@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from glob import escape
 from pathlib import Path
 
@@ -25,6 +25,9 @@ from hdrusd.usd.transform import first_matrix
 
 #: A texture in linear values, (h, w, 3), None where it is missing.
 Picture = Callable[[Image], Doubles | None]
+
+#: m between a light point and the light that it may be the picture of; pairs that are tried.
+_SAME, _MOST_PAIRS = 0.5, 4_000_000
 
 #: A street light shines down, within 30 degrees, into a wide cone from at least 3 m.
 _DOWN, _WIDE, _HIGH = math.cos(math.radians(30.0)), 40.0, 3.0
@@ -55,12 +58,13 @@ class Lead:
     count: int = 1
     strength: tuple[float, ...] = ()  # of the lights: their luminance in the source, least first
     offset: tuple[float, ...] | None = None  # of a lamp in its node's space, source units
+    twin: bool = False  # light points that stand where other lights do
     where: str = "the top of it; want the middle of the lamp"  # what ``offset`` is
 
     @property
     def counts(self) -> bool:
         """Whether it becomes an entry that counts: without a number it would say dark."""
-        return self.certain and self.kind is not None
+        return self.certain and self.kind is not None and not self.twin
 
     names: set[str] = field(default_factory=set)
 
@@ -102,6 +106,7 @@ def _lights(
     up = (0.0, 1.0, 0.0) if scene.up == "Y" else (0.0, 0.0, 1.0)
     ground = _ground(scene, where, up)
     grouped: dict[tuple[str, str], Lead] = {}
+    alone = _lone_lights(scene, where)
     for place in where:
         for index in place.node.lights:
             light = scene.lights[index]
@@ -115,10 +120,31 @@ def _lights(
             what = "light points" if light.positions is not None else f"{light.kind} light"
             lead = grouped.setdefault(key, Lead("light", key[0], what, reason, kind, True, 0))
             lead.count += light.lamps
+            lead.twin = lead.twin or _stands_at(light, place, alone, _SAME / scene.unit_m)
             lead.names.add(light.name or place.node.name)
             value = float(np.dot((0.2126, 0.7152, 0.0722), light.diffuse))
             lead.strength = tuple(sorted({*lead.strength, value}))
     return _told_apart(list(grouped.values()))
+
+
+def _lone_lights(scene: LegacyScene, where: Sequence[Place]) -> Doubles:
+    """Where lights that are no strings stand, (m, 3)."""
+    found = [
+        place.point(scene.lights[index].position)
+        for place in where
+        for index in place.node.lights
+        if scene.lights[index].kind in ("point", "spot") and scene.lights[index].positions is None
+    ]
+    return np.array(found).reshape(-1, 3)
+
+
+def _stands_at(light: Light, place: Place, alone: Doubles, reach: float) -> bool:
+    """Whether each lamp of a string stands where a light does."""
+    if light.positions is None or not 0 < len(alone) * light.lamps <= _MOST_PAIRS:
+        return False
+    lamps = np.c_[light.positions, np.ones(light.lamps)] @ place.world
+    apart = np.linalg.norm(lamps[:, None, :3] - alone[None], axis=-1)
+    return bool((apart.min(axis=1) <= reach).all())
 
 
 def _kind(
@@ -165,16 +191,7 @@ def _told_apart(found: list[Lead]) -> list[Lead]:
 
 def _renamed(lead: Lead, pattern: str, names: int) -> Lead:
     count = lead.count if names == 1 else max(lead.count // names, 1)
-    return Lead(
-        lead.section,
-        pattern,
-        lead.found,
-        lead.reason,
-        lead.kind,
-        lead.certain,
-        count,
-        lead.strength,
-    )
+    return replace(lead, pattern=pattern, count=count)
 
 
 # -- surfaces ------------------------------------------------------------------------------

@@ -42,14 +42,16 @@ def recipe(name: str, found: Sequence[Lead]) -> str:
 def _entry(lead: Lead) -> str:
     kind = lead.kind
     rows = [f"[[{lead.section}]]", f"match = {quoted(lead.pattern)}"]
+    if lead.twin:
+        rows.append("enabled = false")
     if lead.offset is not None:
         rows.append(f"offset = {list(lead.offset)}  # {lead.where}")
-    if kind is None:
+    if kind is None and not lead.twin:
         key = "luminance" if lead.section == "material" else "candela"
         rows.append(f"{key} = 0  # want a number")
         if lead.section == "material" and not lead.certain:
             rows.append("hdr_texture = true  # it shines as its picture does")
-    else:
+    elif kind is not None:
         rows += _values(lead, kind)
     body = "\n".join(rows if lead.counts else [f"# {row}" for row in rows])
     return f"{_comment(_why(lead))}\n{body}"
@@ -68,6 +70,9 @@ def _values(lead: Lead, kind: LampClass) -> Iterator[str]:
 def _why(lead: Lead) -> str:
     count = f"{lead.count} x " if lead.count > 1 else ""
     kind = lead.kind
+    if lead.twin:
+        what = f"they stand where lights are; the same lamps? Then {lead.pattern} may go"
+        return f"{count}{lead.found}: {what}."
     if kind is None:
         level = "what it is is not told" if lead.certain else "suspected"
         text = f"{count}{lead.found}: {lead.reason}; {level}."

@@ -6,15 +6,14 @@ Without a date, so that the same input makes the same bytes.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import count
 from pathlib import Path
 
-from pxr import Sdf, Vt
+from pxr import Sdf, Usd, Vt
 
 from hdrusd import __version__
 
-#: The record's name; another program's stands beside it.
-_API = "AuthorshipAPI:hdrusd"
-_PREFIX = "authorship:hdrusd:"
+_SCHEMA = "AuthorshipAPI"
 
 
 def authorship_inputs(source: Path, photometry: Path | None) -> dict[str, str]:
@@ -23,19 +22,25 @@ def authorship_inputs(source: Path, photometry: Path | None) -> dict[str, str]:
     return inputs if photometry is None else inputs | {"photometry": photometry.name}
 
 
-def write_authorship(layer: Sdf.Layer, path: Sdf.Path, inputs: Mapping[str, str]) -> None:
-    """Note in ``layer`` that hdrusd made the prim at ``path`` of ``inputs``, by name."""
+def write_authorship(
+    layer: Sdf.Layer, path: Sdf.Path, inputs: Mapping[str, str], before: Usd.Prim | None = None
+) -> None:
+    """Note in ``layer`` that hdrusd made the prim at ``path`` of ``inputs``, by name.
+
+    ``before``: the prim as it was, whose records stay: each step has its own.
+    """
+    schemas = set(before.GetAppliedSchemas()) if before else set()
+    names = (f"hdrusd_{number}" if number > 1 else "hdrusd" for number in count(1))
+    name = next(name for name in names if f"{_SCHEMA}:{name}" not in schemas)
     spec = Sdf.CreatePrimInLayer(layer, path)
     listed = spec.GetInfo("apiSchemas").prependedItems if spec.HasInfo("apiSchemas") else []
-    if _API not in listed:
-        spec.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=[*listed, _API]))
+    applied = Sdf.TokenListOp.Create(prependedItems=[*listed, f"{_SCHEMA}:{name}"])
+    spec.SetInfo("apiSchemas", applied)
     pairs = Vt.StringArray([text for pair in inputs.items() for text in pair])
-    for name, kind, value in (
+    for field, kind, value in (
         ("softwarePackage", Sdf.ValueTypeNames.String, "hdrusd"),
         ("softwareVersion", Sdf.ValueTypeNames.String, __version__),
         ("inputs", Sdf.ValueTypeNames.StringArray, pairs),
     ):
-        made = spec.attributes.get(_PREFIX + name) or Sdf.AttributeSpec(
-            spec, _PREFIX + name, kind, Sdf.VariabilityUniform
-        )
-        made.default = value
+        full = f"authorship:{name}:{field}"
+        Sdf.AttributeSpec(spec, full, kind, Sdf.VariabilityUniform).default = value

@@ -26,6 +26,9 @@ from hdrusd.usd.transform import first_matrix, matrices, pose, samples
 #: Times at which the box of a skinned mesh is looked at.
 _BOX_TIMES = 64
 
+#: Joints times time codes of one animation: each joint has a value at the keys of all.
+_MOST_POSES = 4_000_000
+
 #: A matrix with a smaller share of its largest axis has no inverse.
 _FLAT = 1e-9
 
@@ -182,6 +185,12 @@ class Skeletons:
         codes = self._codes([bones.nodes[number] for number in moving])
         if not len(codes):
             return
+        if len(codes) * len(moving) > _MOST_POSES:
+            most = max(_MOST_POSES // len(moving), 2)
+            text = f"{len(codes)} different times of {len(moving)} joints; resampled at {most}"
+            skin = bones.skin
+            self.report.add(Kind.REPLACED, "skin-animation", skin.source, skin.name, text)
+            codes = np.linspace(codes[0], codes[-1], most)
         path = skeleton.GetPath().AppendChild("Animation")
         animation = UsdSkel.Animation.Define(skeleton.GetPrim().GetStage(), path)
         # What stands still has its rest transform, in double precision.
@@ -243,11 +252,15 @@ class Skeletons:
         inverse = dict(zip(bones.bound, bones.skin.inverse_binds, strict=True))
         corners, weights = [], mesh.joint_weights
         assert weights is not None
-        for number in np.unique(indices[weights > 0.0]).tolist():
-            points = mesh.points[((indices == number) & (weights > 0.0)).any(axis=1)]
-            low, high = points.min(axis=0), points.max(axis=0)
-            picks = np.indices((2, 2, 2)).reshape(3, 8).T
-            box = np.append(np.where(picks, high, low), np.ones((8, 1)), axis=1)
+        low = np.full((len(bones.nodes), 3), np.inf)
+        high = -low
+        for joint, share in zip(indices.T, weights.T, strict=True):
+            held = share > 0.0
+            np.minimum.at(low, joint[held], mesh.points[held])
+            np.maximum.at(high, joint[held], mesh.points[held])
+        picks = np.indices((2, 2, 2)).reshape(3, 8).T
+        for number in np.flatnonzero(low[:, 0] <= high[:, 0]).tolist():
+            box = np.append(np.where(picks, high[number], low[number]), np.ones((8, 1)), axis=1)
             corners.append((box @ (inverse[number] @ now[number])).reshape(-1, 4)[:, :3])
         every = np.concatenate(corners)
         every = every[np.isfinite(every).all(axis=1)]

@@ -124,6 +124,16 @@ def test_shared_drawables_count_against_the_limit(tmp_path: Path) -> None:
         )
 
 
+def test_nodes_that_hold_one_another_twice_are_limited(tmp_path: Path) -> None:
+    """Each group holds the next one twice: 2^30 nodes from thirty."""
+    text = "osg::Group {\nUniqueID 100 \n}"
+    for number in range(30):
+        again = text.split("\n")[1]
+        text = group(text, f"osg::Group {{\n{again}\n}}", fields=f"UniqueID {number + 1} ")
+    with pytest.raises(InputError, match="nodes with its instances"):
+        load(tmp_path, HEADER + text)
+
+
 def test_fewer_children_than_declared(tmp_path: Path) -> None:
     text = old_group(old_geode(old_geometry())).replace("num_children 1", "num_children 999999999")
     made = load(tmp_path, text)

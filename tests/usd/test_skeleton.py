@@ -102,7 +102,7 @@ def test_a_bar_bent_by_a_quarter_turn(tmp_path: Path) -> None:
 def test_where_the_skinned_node_stands_does_not_count(tmp_path: Path, unit: float) -> None:
     place = TRS((5.0, 6.0, 7.0), QUARTER, (2.0, 2.0, 2.0))
     stage, _ = written(tmp_path, bar_scene(transform=place, above=moved(0.0, 0.0, 3.0)), unit)
-    np.testing.assert_allclose(points(stage, 24.0), np.array(BENT) + [0, 0, 3], atol=1e-5)
+    np.testing.assert_allclose(points(stage, 24.0), np.add(BENT, (0, 0, 3)), atol=1e-5)
 
 
 def test_the_skinned_node_may_be_animated(tmp_path: Path) -> None:
@@ -207,6 +207,20 @@ def test_a_skin_that_cannot_be_bound_leaves_the_mesh_at_its_node(
     stage, report = written(tmp_path, scene)
     assert report.codes() == {"skin-bind"}
     assert stage.GetPrimAtPath("/s/figure/body/square").IsA(UsdGeom.Mesh)
+
+
+def test_too_many_poses_are_resampled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hdrusd.usd.skeleton._MOST_POSES", 100)
+    scene = bar_scene()
+    times = np.linspace(0.0, 1.0, 1001)
+    halves = np.radians(45.0 * times)
+    turns = np.stack([0 * times, 0 * times, np.sin(halves), np.cos(halves)], axis=1)
+    scene.skins[0].joints[1].animation = (Channel("rotation", times, turns),)
+    stage, report = written(tmp_path, scene)
+    assert report.codes() == {"skin-animation"}
+    np.testing.assert_allclose(points(stage, 24.0), BENT, atol=1e-5)
+    half = [1 + math.sqrt(0.5), math.sqrt(0.5), 0]
+    np.testing.assert_allclose(points(stage, 12.0)[2], half, atol=1e-5)
 
 
 def test_a_bind_matrix_without_volume_is_a_finding(tmp_path: Path) -> None:
