@@ -35,6 +35,7 @@ class _Lamp:
     right: legacy.Vec3 | None = None  # where C = 0 of its photometric file points
     flux: float | None = None  # lm of its photometric file
     shaded: bool = False  # by its own fixture too
+    added: bool = False  # the source says nothing of it
 
     def row(self, path: str, places: int) -> dict[str, Any]:
         """The account of it for the report."""
@@ -42,7 +43,7 @@ class _Lamp:
             self.source.name,
             path,
             self.light,
-            self.source,
+            None if self.added else self.source,
             place=str(self.place.node.source),
             places=places,
             file_flux=self.flux,
@@ -96,7 +97,7 @@ class LampMaker:
                     ambients.append(meaning)
                 elif meaning is not None:
                     shaded = rule is not None and bool(rule.values.get("fixture_shadow"))
-                    lamp = _Lamp(place, light, meaning, shaded=shaded)
+                    lamp = _Lamp(place, light, meaning, shaded=shaded, added=index in self.added)
                     if rule is not None and file is not None:
                         lamp = self._aimed(lamp, rule, file)
                     elif rule is not None:

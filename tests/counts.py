@@ -4,28 +4,30 @@
 
 DIR (default $HDRUSD_TESTDATA/data) holds MANIFEST.md, whose table has the columns file,
 format, bytes, meshes, triangles, materials, textures, lights. Only rows that differ are
-shown, ours after theirs. Files that a reader refuses are told with its line.
+shown, ours after theirs; docs/counts.md says why. Files that a reader refuses are told with
+its line. Counts of a stage are those of its conversion.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import re
-import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from hdrusd.conversion import Options
+from hdrusd.convert import convert
 from hdrusd.errors import InputError
-from hdrusd.importers.importer import SUFFIXES, Resolver, read
+from hdrusd.importers.importer import Resolver, read
 from hdrusd.legacy.scene import LegacyScene, Node
+from hdrusd.overlay.stage import SUFFIXES as STAGES
 from hdrusd.report import Report
 
 COLUMNS = ("meshes", "triangles", "materials", "textures", "lights")
-STAGES = (".usd", ".usda", ".usdc", ".usdz")
 
 
 @dataclass(slots=True)
@@ -36,6 +38,7 @@ class Count:
     theirs: dict[str, int] = field(default_factory=dict)
     ours: dict[str, int] = field(default_factory=dict)
     refusal: str = ""
+    codes: frozenset[str] = frozenset()  # of the findings
 
     @property
     def differing(self) -> dict[str, tuple[int, int]]:
@@ -70,32 +73,28 @@ def scene_counts(scene: LegacyScene) -> dict[str, int]:
     return {key: counts[key] for key in COLUMNS}
 
 
-def stage_counts(path: Path) -> dict[str, int]:
-    """Of a stage, by ``hdrusd info``."""
-    program = "from hdrusd.cli import main; main()"
-    command = [sys.executable, "-c", program, "info", str(path), "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    described: Mapping[str, object] = json.loads(done.stdout)
-    counts = {key: int(str(described[key])) for key in ("triangles", "materials")}
-    return counts | {"lights": int(str(described["lights"]).partition(",")[0])}
-
-
 def count(folder: Path, row: Count) -> Count:
     """Fill in what we find in a file of the manifest."""
     path = folder / row.name
-    if path.suffix.lower() in STAGES:
-        row.ours = stage_counts(path)
-        return row
-    if path.suffix.lower() not in SUFFIXES:
-        row.refusal = "no reader"
-        return row
     report = Report()
-    parts = path.relative_to(folder).parts[:2]
+    roots = (folder.joinpath(*path.relative_to(folder).parts[:2]),)
     try:
-        row.ours = scene_counts(read(Resolver(path, report, (folder.joinpath(*parts),)), report))
+        if path.suffix.lower() in STAGES:
+            with tempfile.TemporaryDirectory() as scratch:
+                output = Path(scratch) / "stage.usda"
+                counts = convert(path, output, Options(roots=roots), report).counts
+                row.ours = {key: counts[key] for key in COLUMNS}
+        else:
+            row.ours = scene_counts(read(Resolver(path, report, roots), report))
     except InputError as error:
         row.refusal = str(error).replace(f"{folder}/", "")
+    row.codes = frozenset(report.codes())
     return row
+
+
+def run_counts(folder: Path) -> list[Count]:
+    """Every file of ``folder``/MANIFEST.md, counted."""
+    return [count(folder, row) for row in manifest(folder / "MANIFEST.md")]
 
 
 def markdown(rows: list[Count]) -> str:
@@ -121,8 +120,7 @@ def main() -> int:
         if "HDRUSD_TESTDATA" not in os.environ:
             parser.error("no folder: name one or set HDRUSD_TESTDATA")
         folder = Path(os.environ["HDRUSD_TESTDATA"]) / "data"
-    rows = [count(folder, row) for row in manifest(folder / "MANIFEST.md")]
-    text = markdown(rows)
+    text = markdown(run_counts(folder))
     print(text, end="")
     if options.markdown is not None:
         options.markdown.write_text(text, encoding="utf-8")

@@ -123,6 +123,7 @@ def test_the_account_leads_back_to_the_entry(tmp_path: Path) -> None:
     sidecar(tmp_path, '[[lamp]]\nat = [[0, 5, 0]]\ncandela = 250\nprovenance = "estimated"\n')
     result = run(source)
     (row,) = (row for row in result.lights if row["kind"] == "point")
+    assert row["source_value"] is None
     assert row["confidence"] == "low"  # somebody's guess, not a colour without a unit
     (entry,) = (e for e in result.as_dict()["fix_first"] if e["what"].startswith("Lamp:"))
     assert entry["write"] is None  # a [[light]] entry would not reach it

@@ -149,8 +149,8 @@ def test_the_road_outside_has_5000(made: Path) -> None:
 @pytest.mark.parametrize(
     ("depth", "luminance", "error"),
     [
-        # CIE 88: L_th = 5 % of 5000 cd/m2 in the first half of the threshold zone; of the rest
-        # 0.4 L_th at its end, at 60 m here. Then (1.9 + t)^-1.4, 25 m being a second.
+        # CIE 88: L_th, here 5 % of 5000 cd/m2, in the first half of the threshold zone; of the
+        # rest 0.4 L_th at its end, at 60 m here. Then (1.9 + t)^-1.4, 25 m being a second.
         (22.0, 250.0, 0.02),
         (45.0, 175.0, 0.02),
         (85.0, 250.0 * 2.9**-1.4, 0.05),
@@ -206,13 +206,17 @@ AIM = -0.57
 @pytest.mark.parametrize(
     ("across", "up", "least", "most"),
     [
-        # Points of a passing beam on a screen in 25 m, degrees from the lamp's level
-        # (UN R112, class B, quoted from general knowledge): lux times 625 m2.
-        (1.15, -0.57, 12.0 * 625, 40_000.0),  # 75 R
-        (1.72, -0.86, 12.0 * 625, 40_000.0),  # 50 R
-        (-1.72, -0.86, 0.0, 15.0 * 625),  # 50 L: no more than this
+        # UN R112, class B: cd at points of a passing beam, degrees from the lamp's level.
+        (1.15, -0.57, 10_100.0, math.inf),  # 75 R
+        (1.72, -0.86, 10_100.0, math.inf),  # 50 R
+        (-3.43, -0.57, 0.0, 10_600.0),  # 75 L
+        (-3.43, -0.86, 0.0, 13_200.0),  # 50 L
+        (0.0, -0.86, 5100.0, math.inf),  # 50 V
+        (-9.0, -1.72, 1700.0, math.inf),  # 25 L
+        (9.0, -1.72, 1700.0, math.inf),  # 25 R
+        (2.5, 1.0, 0.0, 1750.0),  # BR
         (-3.43, 0.57, 0.0, 350.0),  # B 50 L: oncoming eyes
-        (-8.0, 4.0, 0.0, 400.0),
+        (-8.0, 4.0, 0.0, 625.0),  # zone III
     ],
 )
 def test_the_beam_is_one_of_traffic(

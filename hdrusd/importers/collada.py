@@ -47,6 +47,13 @@ _READ = frozenset(
         "library_visual_scenes",
     )
 )
+#: What stands in a scene by an instance: a library's children, and the library.
+_INSTANCED = {
+    "geometry": "library_geometries",
+    "controller": "library_controllers",
+    "light": "library_lights",
+    "camera": "library_cameras",
+}
 #: X_UP is right -Y, up +X, in +Z: (x, y, z) becomes (-y, x, z) with Y up. For row vectors.
 _X_UP = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 
@@ -84,6 +91,7 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
         roots = [Node("x_up", document.ref(root), transform=_X_UP, children=roots)]
     _unused_materials(document, nodes)
     _note_unread(document)
+    _note_unplaced(document)
     return LegacyScene(
         source=resolver.source,
         format="collada",
@@ -126,6 +134,23 @@ def _unused_materials(document: Document, nodes: NodeReader) -> None:
         for element in library.all("material"):
             if document.ref(element) not in worn:
                 nodes.material(element, {})
+
+
+def _note_unplaced(document: Document) -> None:
+    """What the libraries hold and nothing in the file names; only what is named is read."""
+    used = {
+        address.rpartition("#")[2]
+        for element in document.root.walk()
+        for address in (element.get("url"), element.get("source"))
+    }
+    for tag, library in _INSTANCED.items():
+        things = [thing for lib in document.root.all(library) for thing in lib.all(tag)]
+        lost = [thing for thing in things if thing.get("id") not in used]
+        if lost:
+            names = ", ".join(named(thing, "no name")[:60] for thing in lost[:3])
+            more = ", ..." if len(lost) > 3 else ""
+            text = f"{library}: {len(lost)} of {len(things)} stand nowhere: {names}{more}; not read"
+            document.note(Kind.DROPPED, "unplaced", lost[0], "", text)
 
 
 def _note_unread(document: Document) -> None:

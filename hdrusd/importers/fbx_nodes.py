@@ -181,3 +181,13 @@ def note_unread(document: Document, nodes: Mapping[str, str]) -> None:
             names = ", ".join(element.name for element in list(elements)[:4] if element.name)
             text = f"{len(elements)} {words} not read{f': {names}' if names else ''}"
             document.note(Kind.DROPPED, "fbx-element", document.ref(table), "", text)
+
+
+def note_unplaced(document: Document) -> None:
+    """Meshes, lights and cameras that no node has, which are not read: a finding for each kind."""
+    for table in ("meshes", "lights", "cameras"):
+        lost = [one for one in getattr(document.scene, table) if not len(one.instances)]
+        if lost:
+            names = ", ".join(one.name for one in lost[:4] if one.name)
+            text = f"{len(lost)} {table} that no node has, not read{f': {names}' if names else ''}"
+            document.note(Kind.DROPPED, "unplaced", document.ref(table), "", text)

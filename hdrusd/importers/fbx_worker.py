@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from hdrusd.importers.fbx_document import Document, open_document
 from hdrusd.importers.fbx_materials import read_materials
-from hdrusd.importers.fbx_nodes import NodeReader, note_unread, wearers
+from hdrusd.importers.fbx_nodes import NodeReader, note_unplaced, note_unread, wearers
 from hdrusd.importers.importer import Resolver
 from hdrusd.legacy.scene import RGB, LegacyScene
 from hdrusd.report import Kind, Report
@@ -33,6 +33,7 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
     materials = read_materials(document, wearers(document))
     nodes = NodeReader(document, [material.two_sided for material in materials])
     note_unread(document, _UNREAD)
+    note_unplaced(document)
     scene = LegacyScene(
         source=resolver.source,
         format="fbx",

@@ -54,8 +54,10 @@ class GeometryReader:
         indices = vertices.indices
         polygons = self.primitives.read(geometry, len(points) if indices is None else len(indices))
         corners = polygons.elements if indices is None else indices[polygons.elements]
+        finite = np.isfinite(points).all(axis=1)
         good = (corners >= 0) & (corners < len(points))
-        good[good] = np.isfinite(points[corners[good]]).all(axis=1)
+        if not finite.all():
+            good[good] = finite[corners[good]]
         if not good.all():
             first = np.cumsum(polygons.counts) - polygons.counts
             keep = np.logical_and.reduceat(good, first)
@@ -69,7 +71,7 @@ class GeometryReader:
         mesh = Mesh(
             name,
             document.ref(geometry),
-            np.where(np.isfinite(points), points, np.float32(0.0)),
+            points if finite.all() else np.where(np.isfinite(points), points, np.float32(0.0)),
             polygons.counts.astype(np.int32),
             corners.astype(np.int32),
         )
@@ -103,8 +105,9 @@ class GeometryReader:
         values = _columns(vertices.values, 3, 0.0)
         with np.errstate(over="ignore"):  # infinite in float32: those faces are dropped
             points = values.astype(np.float32)
-        finite = np.isfinite(points).all(axis=1)
-        lost = np.abs(values[finite] - points[finite]).max(initial=0.0)
+        with np.errstate(invalid="ignore"):
+            lost = np.abs(values - points)
+        lost = lost.max(initial=0.0, where=np.isfinite(lost))
         if lost > _PRECISION:
             self.document.add(
                 Kind.CLAMPED,

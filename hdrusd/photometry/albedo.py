@@ -5,8 +5,8 @@ right. Classes of surfaces have known ranges, found by the words of a material's
 texture's name; whatever the class, nothing a road scene shows sends back much more than 0.9
 or less than 0.02. Nothing here changes a number.
 
-Ranges are of visible light where the source has them, rounded outwards. Oke's are of all
-sunlight: of what is grey they hold for visible light too; of plants, which are bright in the
+Ranges are of visible light where the source has them, rounded outwards. Oke's and Pon's are of
+all sunlight: of what is grey they hold for visible light too; of plants, which are bright in the
 infrared only, they are not used.
 """
 

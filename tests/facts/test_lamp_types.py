@@ -52,7 +52,8 @@ def test_sp_of_the_sodium_lines() -> None:
 
 
 def test_the_colour_of_the_sodium_lines() -> None:
-    # x, y of 589.3 nm in CIE 1931 (between 589 and 590 nm of its table), to linear Rec. 709 (IEC 61966-2-1, D65) of Y = 1.
+    # x, y of 589.3 nm in CIE 1931, between 589 and 590 nm of its table, to linear Rec. 709
+    # (IEC 61966-2-1, D65) of Y = 1.
     x, y = 0.5710, 0.4283
     big_x, big_z = x / y, (1.0 - x - y) / y
     red = 3.2406 * big_x - 1.5372 - 0.4986 * big_z

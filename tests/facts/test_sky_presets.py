@@ -34,8 +34,8 @@ def test_a_picture_gives_the_skys_lux(name: str, altitude: float | None) -> None
     ("name", "altitude", "lux", "within"),
     [
         ("moonless", None, 1e-3, 0.0),
-        # RCA, Electro-Optics Handbook: twilight 10 lx, deep twilight 1 lx; the ends of civil and
-        # nautical twilight have 3.4 and 0.008 lx (Seidelmann 1992, table 9.1).
+        # The ends of civil, nautical and astronomical twilight have 2 to 3.5, 0.008 and 6e-4 lx
+        # (AMS Glossary of Meteorology); these are Janiczek and DeYoung's.
         ("dusk", -6.0, 3.4, 0.01),
         ("dusk", -12.0, 0.008, 0.02),
         ("dusk", -18.0, 6.5e-4, 0.02),
