@@ -83,8 +83,8 @@ def command(
 ) -> None:
     """Turn SOURCE into a photometric stage OUTPUT.usda.
 
-    SOURCE: a database (.3ds .dae .flt .gltf .glb .obj .osg .osgt), or a stage (.usd .usda .usdc
-    .usdz). Beside OUTPUT stand its layers (geometry, look, photometry) and textures. A stage
+    SOURCE: a database (.3ds .ac .b3d .dae .fbx .flt .glb .gltf .ive .kmz .lwo .ms3d .obj .off
+    .osg .osgb .osgt .ply .stl .x .zae), or a stage (.usd .usda .usdc .usdz). Beside OUTPUT stand its layers (geometry, look, photometry) and textures. A stage
     stays where it is and as it is; OUTPUT names it below a layer with its photometry, and may
     not replace it.
     """

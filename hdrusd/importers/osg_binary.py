@@ -188,7 +188,7 @@ class _Objects(Bytes):
             elif code in DTYPES and len(layout) == 1:
                 statements.append(Statement([name, *self.words(layout[0])], place))
             elif code == "[":
-                yield from self._vector(name, layout[0].inside[0], statements)
+                yield from self._vector(name, layout[0].inside, statements)
             elif code == "!":
                 raise UnknownPartError(place, f"{label}: {name} is not known here")
             else:
@@ -196,17 +196,14 @@ class _Objects(Bytes):
                 statements.append(line)
                 yield from self._layout(layout, line, block)
 
-    def _vector(self, name: str, item: Element, statements: list[Statement]) -> Reader:
+    def _vector(
+        self, name: str, items: tuple[Element, ...], statements: list[Statement]
+    ) -> Reader:
         place, count = self.at, self.number()
-        if not count:
-            return
-        line = Statement([name, str(count)], place, Block())
-        if item.code in DTYPES:
-            line.block = self.view(item.code, item.times, count)
+        if count:
+            line = Statement([name, str(count)], place)
             statements.append(line)
-            return
-        statements.append(line)
-        yield from self._items(count, (item,), line)
+            yield from self._items(count, items, line)
 
     def _items(self, count: int, layout: tuple[Element, ...], line: Statement) -> Reader:
         """Read ``count`` times what a layout says, into a block of ``line``."""

@@ -37,19 +37,19 @@ BufferObject(Object) Target:g Usage:g CopyDataAndReleaseGLBufferObject:b
 ByteArray(Object BufferData@147- Array) vector:[c]
 Callback(Object) NestedCallback:O
 CallbackObject(Object Callback)
-Camera(Object Node Group Transform) AllowEventFocus:b ClearMask:i ClearColor:4f ClearAccum:4f
-  ClearDepth:d ClearStencil:i ColorMask:O Viewport:O TransformOrder:i ProjectionResizePolicy:i
-  ProjectionMatrix:M ViewMatrix:M RenderOrder:?2i DrawBuffer:g ReadBuffer:g
-  RenderTargetImplementation:i BufferAttachmentMap:?! InitialDrawCallback:O PreDrawCallback:O
-  PostDrawCallback:O FinalDrawCallback:O InheritanceMaskActionOnAttributeSetting@123-:i
-  InheritanceMask@123-:i ImplicitBufferAttachmentRenderMask@140-:i
-  ImplicitBufferAttachmentResolveMask@140-:i
+Camera(Object Node Group Transform) AllowEventFocus:b ClearMask@-122:?i ClearMask@123-:i
+  ClearColor:4f ClearAccum:4f ClearDepth:d ClearStencil:i ColorMask:O Viewport:O TransformOrder:i
+  ProjectionResizePolicy:i ProjectionMatrix:M ViewMatrix:M RenderOrder:?2i DrawBuffer:g
+  ReadBuffer:g RenderTargetImplementation:i BufferAttachmentMap:?! InitialDrawCallback:O
+  PreDrawCallback:O PostDrawCallback:O FinalDrawCallback:O
+  InheritanceMaskActionOnAttributeSetting@123-:i InheritanceMask@123-:i
+  ImplicitBufferAttachmentRenderMask@140-:i ImplicitBufferAttachmentResolveMask@140-:i
 CameraView(Object Node Group Transform) Position:3d Attitude:4d FieldOfView:d
   FieldOfViewMode:e(0=UNCONSTRAINED/1=HORIZONTAL/2=VERTICAL) FocalLength:d
 Capsule(Object Shape) Center:3f Radius:f Height:f Rotation:4d
 CharValueObject(Object) Value:c
 ClampColor(Object StateAttribute) ClampVertexColor:g ClampFragmentColor:g ClampReadColor:g
-ClearNode(Object Node Group) RequiresClear:b ClearColor:4f ClearMask:i
+ClearNode(Object Node Group) RequiresClear:b ClearColor:4f ClearMask@-122:?i ClearMask@123-:i
 ClipControl(Object StateAttribute) Origin:i DepthMode:i
 ClipNode(Object Node Group) ClipPlaneList:[o] ReferenceFrame:i
 ClipPlane(Object StateAttribute) ClipPlane:4d ClipPlaneNum:I

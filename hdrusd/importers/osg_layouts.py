@@ -17,7 +17,7 @@ that does not become part of the tree. Then, after a number that repeats it,
     m  Y  Z                       the same for images
     a  A  p  V                    array that may be missing, array, primitive set and vertex data
                                   as they were before version 112
-    [x]  n{x,y}  N{x,y}  {x,y}    counted values; in brackets; the same, without brackets if none;
+    [x,y]  n{x,y}  N{x,y}  {x,y}    counted values; in brackets; the same, without brackets if none;
                                   brackets alone
     =Word  Name:                  in the text form: a word, the begin of a line
     K  T                          animation channel, shown text
@@ -43,7 +43,7 @@ _HEAD = re.compile(r"([\w:]+)\(([^)]*)\)")
 _FIELD = re.compile(r"(\w+)(?:@(\d*)-(\d*))?(?::(.*))?")
 _TOKEN = re.compile(
     r"=(?P<word>\w+)|(?P<line>\w+):|(?P<open>[nN]?\{)|(?P<close>\})|e\((?P<names>[^)]*)\)"
-    r"|\[(?P<vector>\d*[a-zA-Z])\]|(?P<times>\d*)(?P<code>[a-zA-Z!])"
+    r"|\[(?P<vector>[^\]]*)\]|(?P<times>\d*)(?P<code>[a-zA-Z!])"
 )
 
 #: Codes of values of one size and NumPy's names of them, without the byte order.

@@ -157,6 +157,6 @@ osgText::Text3D(Object Node@154- Drawable osgText::TextBase) CharacterDepth:f Re
   Color@68-:4f
 osgText::TextBase(Object Node@154- Drawable) Font:?s FontSize:?2I CharacterSize:?2f
   CharacterSizeMode:i MaximumWidth:f MaximumHeight:f LineSpacing:f Text:?T Position:3f
-  Alignment:i AxisAlignment:i Rotation:4d AutoRotateToScreen:b Layout:i DrawMode:i
-  BoundingBoxMargin:f BoundingBoxColor:4f
+  Alignment:i AxisAlignment:i Rotation:4d AutoRotateToScreen:b Layout:i DrawMode@-122:?i
+  DrawMode@123-:i BoundingBoxMargin:f BoundingBoxColor:4f
 """

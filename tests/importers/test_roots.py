@@ -8,17 +8,24 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import collada_builder
+import fbx_builder
 import flt_builder
 import osg_builder
 import pytest
 import tds_builder
 from builders import obj, png
+from fbx_builder import needs_ufbx
 from file_watch import watched
+from overlaid import HEAD, paint, stage_file
+from photometric_files import ies_text
+from test_assimp import AC3D, needs_assimp
+from test_osgconv import TEXT, needs_osgconv
 
 from hdrusd.conversion import Options
 from hdrusd.convert import convert
@@ -99,8 +106,106 @@ def a_flt_reference(file: Path, name: str) -> None:
     file.write_bytes(build.database(own, build.external(name), vertices=pool.data))
 
 
+def a_binary_osg(file: Path, name: str) -> None:
+    text = file.with_name("text.osg")
+    text.write_text(TEXT % name)
+    option = "noTexturesInIVEFile" if file.suffix == ".ive" else "WriteImageHint=UseExternal"
+    command = ["osgconv", "-O", option, text.name, file.name]
+    subprocess.run(command, cwd=file.parent, check=True, capture_output=True)
+    text.unlink()
+
+
+def an_fbx(file: Path, name: str) -> None:
+    made = fbx_builder.Fbx()
+    node = made.model("n", "Mesh")
+    uvs = fbx_builder.layer("LayerElementUV", "UV", [0.0, 0.0], [0] * 4, name="uv")
+    made.mesh(node, fbx_builder.SQUARE, [(0, 1, 2, 3)], uvs)
+    material = made.add("Material", "m", "", "Version: 102", 'ShadingModel: "phong"', under=node)
+    names = f'RelativeFilename: "{name}"', f'FileName: "{name}"'
+    texture = made.add("Texture", "t", "", 'Type: "TextureVideoClip"', *names, under=None)
+    made.connect(texture, material, "DiffuseColor")
+    made.write(file.parent, file.name)
+
+
+def an_ac3d(file: Path, name: str) -> None:
+    file.write_text(AC3D.replace("wall.png", name))
+
+
+#: A stage of its own, so that what is refused does not leave nothing.
+OWN = 'def SphereLight "Own" {\n}'
+
+
+def a_stage_texture(file: Path, name: str) -> None:
+    stage_file(file, OWN, paint("/World/paint", f"asset inputs:file = @{name}@"))
+
+
+def a_stage_emission(file: Path, name: str) -> None:
+    nodes = paint("/World/paint", f"asset inputs:file = @{name}@")
+    stage_file(file, OWN, nodes.replace("inputs:diffuseColor", "inputs:emissiveColor"))
+
+
+def a_stage_sublayer(file: Path, name: str) -> None:
+    stage_file(file, OWN, head=HEAD.replace("(", f"(\n    subLayers = [@{name}@]", 1))
+
+
+def a_stage_arc(file: Path, name: str, arc: str) -> None:
+    stage_file(file, OWN, f'def "Other" (\n    {arc} = @{name}@\n)\n{{\n}}')
+
+
+def a_stage_reference(file: Path, name: str) -> None:
+    a_stage_arc(file, name, "references")
+
+
+def a_stage_payload(file: Path, name: str) -> None:
+    a_stage_arc(file, name, "payload")
+
+
+def a_stage_variant(file: Path, name: str) -> None:
+    """A reference in a variant that is not selected, which a conversion selects in turn."""
+    choice = f'"far" {{\n}}\n"near" (\n references = @{name}@\n) {{\n}}'
+    more = 'variants = { string lod = "far" }\nprepend variantSets = "lod"'
+    stage_file(file, OWN, f'def "A" (\n{more}\n)\n{{\nvariantSet "lod" = {{\n{choice}\n}}\n}}')
+
+
+def a_stage_expression(file: Path, name: str) -> None:
+    """A reference whose name is known only when it is composed."""
+    variables = f'(\n    expressionVariables = {{\n string WHERE = "{name}"\n }}'
+    reference = 'def "Other" (\n    references = @`"${WHERE}"`@\n)\n{\n}'
+    stage_file(file, OWN, reference, head=HEAD.replace("(", variables, 1))
+
+
+def a_stage_clip(file: Path, name: str) -> None:
+    """Value clips: values of a prim from other layers, by time."""
+    clips = (
+        "clips = {\n dictionary default = {\n"
+        f"  asset[] assetPaths = [@{name}@]\n  asset manifestAssetPath = @{name}@\n"
+        '  string primPath = "/World"\n  double2[] active = [(0, 0)]\n }\n}'
+    )
+    stage_file(file, OWN, f'def Sphere "Moving" (\n{clips}\n)\n{{\n}}')
+
+
+def a_stage_light(file: Path, name: str, kind: str, attribute: str) -> None:
+    schema = '(\n prepend apiSchemas = ["ShapingAPI"]\n)' if "shaping" in attribute else ""
+    light = f'def {kind} "Shown" {schema}\n{{\n asset inputs:{attribute} = @{name}@\n}}'
+    stage_file(file, OWN, light)
+
+
+def a_stage_sky(file: Path, name: str) -> None:
+    a_stage_light(file, name, "DomeLight", "texture:file")
+
+
+def a_stage_screen(file: Path, name: str) -> None:
+    a_stage_light(file, name, "RectLight", "texture:file")
+
+
+def a_stage_profile(file: Path, name: str) -> None:
+    a_stage_light(file, name, "SphereLight", "shaping:ies:file")
+
+
+Writer = Callable[[Path, str], None]
+
 #: Suffix of the source, who writes it, and the file that lies outside.
-WRITERS: tuple[tuple[str, Callable[[Path, str], None], str], ...] = (
+WRITERS: list[tuple[str, Writer, str]] = [
     (".obj", an_obj, "secret.png"),
     (".obj", an_obj_library, "secret.mtl"),
     (".gltf", gltf, "secret.png"),
@@ -110,7 +215,25 @@ WRITERS: tuple[tuple[str, Callable[[Path, str], None], str], ...] = (
     (".3ds", a_3ds, "secret.png"),
     (".flt", a_flt, "secret.png"),
     (".flt", a_flt_reference, "secret.flt"),
-)
+    (".usda", a_stage_texture, "secret.png"),
+    (".usda", a_stage_emission, "secret.png"),
+    (".usda", a_stage_sublayer, "secret.usda"),
+    (".usda", a_stage_reference, "secret.usda"),
+    (".usda", a_stage_payload, "secret.usda"),
+    (".usda", a_stage_variant, "secret.usda"),
+    (".usda", a_stage_expression, "secret.usda"),
+    (".usda", a_stage_clip, "secret.usda"),
+    (".usda", a_stage_sky, "secret.png"),
+    (".usda", a_stage_screen, "secret.png"),
+    (".usda", a_stage_profile, "secret.ies"),
+]
+ALL_WRITERS = [
+    *WRITERS,
+    pytest.param(".osgb", a_binary_osg, "secret.png", marks=needs_osgconv),
+    pytest.param(".ive", a_binary_osg, "secret.png", marks=needs_osgconv),
+    pytest.param(".fbx", an_fbx, "secret.png", marks=needs_ufbx),
+    pytest.param(".ac", an_ac3d, "secret.png", marks=needs_assimp),
+]
 
 
 @pytest.fixture
@@ -121,6 +244,8 @@ def outside(tmp_path: Path) -> Path:
     (folder / "secret.mtl").write_text("newmtl m\nKd 1 0 0\n")
     (folder / "secret.bin").write_bytes(bytes(36))
     a_flt(folder / "secret.flt", "none.rgb")
+    stage_file(folder / "secret.usda", 'def SphereLight "Secret" {\n}')
+    (folder / "secret.ies").write_text(ies_text())
     return folder
 
 
@@ -134,7 +259,7 @@ def attempt(source: Path, output: Path, **options: object) -> Report:
     return report
 
 
-@pytest.mark.parametrize(("suffix", "write", "file"), WRITERS)
+@pytest.mark.parametrize(("suffix", "write", "file"), ALL_WRITERS)
 @pytest.mark.parametrize("form", ["above", "absolute", "uri", "link"])
 def test_nothing_outside_is_opened(
     tmp_path: Path,
@@ -164,7 +289,7 @@ def test_nothing_outside_is_opened(
         assert "file-refused" in report.codes() or not (tmp_path / "out" / "a.usda").exists()
 
 
-@pytest.mark.parametrize(("suffix", "write", "file"), WRITERS)
+@pytest.mark.parametrize(("suffix", "write", "file"), ALL_WRITERS)
 def test_what_a_root_allows_is_opened(
     tmp_path: Path, outside: Path, suffix: str, write: Callable[[Path, str], None], file: str
 ) -> None:
