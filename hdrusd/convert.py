@@ -23,7 +23,7 @@ from hdrusd.lamps import LampMaker, temperature_rgb
 from hdrusd.legacy import scene as legacy
 from hdrusd.luminaires import LuminaireFiles
 from hdrusd.maps import MapWriter
-from hdrusd.overlay.stage import SUFFIXES, Overlay
+from hdrusd.overlay.stage import Overlay
 from hdrusd.photometry.estimate import RULES
 from hdrusd.photometry.interpret import Interpreter
 from hdrusd.photometry.lamp_area import LampArea
@@ -36,6 +36,7 @@ from hdrusd.usd.material import Surface, write_look, write_photometric
 from hdrusd.usd.mesh import COLOR_PRIMVAR
 from hdrusd.usd.placed import area_scales, footprint
 from hdrusd.usd.settings import Settings
+from hdrusd.usd.source_stage import STAGES
 from hdrusd.usd.tree import Place
 from hdrusd.usd.worn_area import lamp_area
 from hdrusd.usd.writer import StageWriter
@@ -55,7 +56,7 @@ def convert(source: Path, output: Path, options: Options, report: Report | None 
     if not source.is_file():
         raise InputError(source, "no such file")
     with work_folder(output) as folder:
-        if source.suffix.lower() in SUFFIXES:
+        if source.suffix.lower() in STAGES:
             sidecar = _find_sidecar(source, options, report)
             result = Overlay(source, output, folder, options, sidecar, report).run()
         else:

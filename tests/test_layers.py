@@ -38,7 +38,7 @@ LAYERS = (
 
 #: Who may import what does not come with Python; NumPy is everybody's.
 THIRD_PARTY = {
-    "pxr": {"schemas", "usd", "validation", "convert", "lamps", "overlay", "render"},
+    "pxr": {"schemas", "usd", "validation", "convert", "lamps", "overlay", "recipe", "render"},
     "moderngl": {"gpu", "render", "viewing"},
     "OpenEXR": {"images"},
     "OpenImageIO": {"bracket", "contact_sheet", "images"},

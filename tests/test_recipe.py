@@ -231,3 +231,66 @@ def test_real_databases(testdata: Path, tmp_path: Path, name: str) -> None:
     assert not [code for code in result.report.codes() if code.startswith("sidecar")]
     levels = json.dumps([row["confidence"] for row in (*result.lights, *result.materials)])
     assert '"low"' in levels
+
+
+STAGE = """\
+#usda 1.0
+(
+    metersPerUnit = 0.01
+    upAxis = "Z"
+)
+def Xform "StreetLamp_1"
+{
+    double3 xformOp:translate = (0, 0, 800)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+    def SphereLight "Bulb" (prepend apiSchemas = ["ShapingAPI"])
+    {
+        float inputs:shaping:cone:angle = 70
+    }
+    def Mesh "Glass" (prepend apiSchemas = ["MaterialBindingAPI"])
+    {
+        point3f[] points = [(0, 0, 0), (30, 0, 0), (30, 30, 0)]
+        int[] faceVertexCounts = [3]
+        int[] faceVertexIndices = [0, 1, 2]
+        rel material:binding = </Glow>
+    }
+}
+def DistantLight "Sun"
+{
+}
+def Mesh "Ground"
+{
+    point3f[] points = [(-900, -900, 0), (900, -900, 0), (900, 900, 0)]
+    int[] faceVertexCounts = [3]
+    int[] faceVertexIndices = [0, 1, 2]
+}
+def Material "Glow"
+{
+    token outputs:surface.connect = </Glow/S.outputs:surface>
+    def Shader "S"
+    {
+        uniform token info:id = "UsdPreviewSurface"
+        color3f inputs:emissiveColor = (1, 1, 1)
+        token outputs:surface
+    }
+}
+"""
+
+
+def test_a_stage_is_a_database_too(tmp_path: Path) -> None:
+    (tmp_path / "a.usda").write_text(STAGE)
+    done = init(str(tmp_path / "a.usda"))
+    assert done.exit_code == 0, done.output
+    text = (tmp_path / "photometry.toml").read_text()
+    document = tomllib.loads(text)
+    assert [entry["match"] for entry in document["light"]] == ["Bulb"]
+    assert document["light"][0]["lumens"] == BY_NAME["street-light"].typical
+    assert [entry["match"] for entry in document["material"]] == ["Glow"]
+    assert '# match = "Sun"' in text  # nothing tells how strong it is
+    result = run(tmp_path / "a.usda", tmp_path / "out" / "b.usda")
+    assert not [code for code in result.report.codes() if code.startswith("sidecar")]
+    # What is photometric now needs no recipe any more.
+    done = init(str(result.output), str(tmp_path / "again.toml"))
+    assert done.exit_code == 0, done.output
+    again = tomllib.loads((tmp_path / "again.toml").read_text())
+    assert set(again) == {"ambient"}

@@ -147,7 +147,7 @@ class LightOverlay:
 
     def _free(self, root: Usd.Prim, name: str) -> Sdf.Path:
         """A path below the default prim where the stage has nothing."""
-        taken = set(root.GetAllChildrenNames())
+        taken = dict.fromkeys(root.GetAllChildrenNames(), 1)
         return root.GetPath().AppendChild(unique(name, taken))
 
     def note_kept(self) -> None:

@@ -43,9 +43,6 @@ from hdrusd.usd.source_stage import (
 from hdrusd.usd.variant_choices import Brought, Choice, other_variants
 from hdrusd.validation import validate
 
-#: Suffixes of the sources that are stages already.
-SUFFIXES = (".usda", ".usdc", ".usd", ".usdz")
-
 #: Variants that are selected in turn, outer ones first.
 _Choices = tuple[Choice, ...]
 

@@ -88,12 +88,13 @@ def stem(name: str) -> str:
 
 
 def _class(names: Iterable[str]) -> tuple[LampClass, str] | None:
-    """The class that the first telling name has, and that name."""
-    for name in names:
-        kind = lamp_class(name)
-        if kind is not None:
-            return kind, name
-    return None
+    """The class that the first telling name has, and that name.
+
+    A bulb is a part of many lamps: whatever else is told goes before it.
+    """
+    told = [(kind, name) for name in names if (kind := lamp_class(name)) is not None]
+    more = [(kind, name) for kind, name in told if kind.name != "household-bulb"]
+    return next(iter(more or told), None)
 
 
 # -- lights --------------------------------------------------------------------------------

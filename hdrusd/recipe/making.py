@@ -17,9 +17,11 @@ from hdrusd.legacy.scene import Image
 from hdrusd.photometry.reflectance import reflectance_table
 from hdrusd.recipe.evidence import leads
 from hdrusd.recipe.places import Doubles
+from hdrusd.recipe.stage_scene import stage_scene
 from hdrusd.recipe.text import recipe
 from hdrusd.report import Report
 from hdrusd.units import TEXTURE_GAMMA
+from hdrusd.usd.source_stage import STAGES
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +41,11 @@ def write_recipe(
     search: Sequence[Path] = (),
 ) -> Recipe:
     """Read ``source``, write ``output`` (None: do not). Raises InputError."""
-    scene = read(Resolver(source, report, roots, search), report)
+    resolver = Resolver(source, report, roots, search)
+    if source.suffix.lower() in STAGES:
+        scene = stage_scene(source, resolver.allowed, report)
+    else:
+        scene = read(resolver, report)
     found = leads(scene, _picture)
     counted = sum(lead.counts for lead in found)
     text = recipe(source.name, found)

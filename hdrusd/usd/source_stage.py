@@ -16,6 +16,9 @@ from hdrusd.errors import InputError, SourceRef
 from hdrusd.report import Kind, Report
 from hdrusd.usd.opening import one_line_of, usd_warnings
 
+#: Suffixes of the sources that are stages already.
+STAGES = (".usda", ".usdc", ".usd", ".usdz")
+
 #: What of a root layer is not its stage's: how it is put together, and notes about the file.
 _OF_THE_LAYER = frozenset(
     {"subLayers", "subLayerOffsets", "layerRelocates", "comment", "documentation"}
