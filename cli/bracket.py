@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from .options import FILE, finish, report_options, tell, write_report
+from .options import FILE, NumberRange, finish, report_options, tell, write_report
 
 
 def _numbers(text: str, option: str) -> list[float]:
@@ -55,7 +55,7 @@ def _whole(values: list[float], text: str, option: str) -> list[int]:
 @click.option("--response-out", type=FILE, help="Write the recovered response as JSON.")
 @click.option(
     "--smoothness",
-    type=click.FloatRange(0.0, 1e6),
+    type=NumberRange(0.0, 1e6),
     help="Debevec and Malik's lambda. [default: 16]",
 )
 @click.option(

@@ -11,7 +11,7 @@ import click
 from hdrusd.errors import HdrusdError
 from hdrusd.photometry.estimate import DEFAULT_RULE, RULES
 
-from .options import FILE, FOLDER, finish, report_options, tell, write_report
+from .options import FILE, FOLDER, NumberRange, finish, report_options, tell, write_report
 
 
 @click.command("convert")
@@ -27,21 +27,21 @@ from .options import FILE, FOLDER, finish, report_options, tell, write_report
 )
 @click.option(
     "--gamma",
-    type=click.FloatRange(0.1, 10.0),
+    type=NumberRange(0.1, 10.0),
     help="Exponent in R = T^gamma * D of all materials; overrides the photometry file. "
     "[default: the photometry file's, else 2.2]",
 )
 @click.option(
     "--meters-per-unit",
     "--metersPerUnit",
-    type=click.FloatRange(1e-9, 1e9),
+    type=NumberRange(1e-9, 1e9),
     default=1.0,
     show_default=True,
     help="Unit of the stage.",
 )
 @click.option(
     "--source-unit",
-    type=click.FloatRange(1e-9, 1e9),
+    type=NumberRange(1e-9, 1e9),
     metavar="METERS",
     help="Metres a source unit, where the format does not say or is wrong.",
 )
@@ -84,9 +84,9 @@ def command(
     """Turn SOURCE into a photometric stage OUTPUT.usda.
 
     SOURCE: a database (.3ds .ac .b3d .dae .fbx .flt .glb .gltf .ive .kmz .lwo .ms3d .obj .off
-    .osg .osgb .osgt .ply .stl .x .zae), or a stage (.usd .usda .usdc .usdz). Beside OUTPUT stand its layers (geometry, look, photometry) and textures. A stage
-    stays where it is and as it is; OUTPUT names it below a layer with its photometry, and may
-    not replace it.
+    .osg .osgb .osgt .ply .stl .x .zae), or a stage (.usd .usda .usdc .usdz). Beside OUTPUT stand
+    its layers (geometry, look, photometry) and textures. A stage stays where it is and as it is;
+    OUTPUT names it below a layer with its photometry, and may not replace it.
     """
     from hdrusd.account.text import summary
     from hdrusd.conversion import Options

@@ -10,7 +10,7 @@ import click
 
 from hdrusd.frames import has_placeholder, parse_frames
 
-from .options import FILE
+from .options import FILE, NumberRange
 
 if TYPE_CHECKING:
     from hdrusd.course import Start
@@ -62,7 +62,7 @@ def eye_options(function: F) -> F:
         click.option(
             "--warm-up",
             metavar="SECONDS",
-            type=click.FloatRange(0.0),
+            type=NumberRange(0.0),
             default=0.0,
             help="Look at the first frame for so long after --adapt-from or --state-in.",
         ),

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
@@ -30,12 +32,36 @@ FILE = click.Path(path_type=Path, dir_okay=False)
 FOLDER = click.Path(path_type=Path, file_okay=False, exists=True)
 
 
+class NumberRange(click.FloatRange):
+    """A range that NaN is not in, though it compares false with both ends."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """The number. Raises BadParameter."""
+        number: float = super().convert(value, param, ctx)
+        if math.isnan(number):
+            self.fail(f"{value} is no number.", param, ctx)
+        return number
+
+
+def _spare(path: Path) -> None:
+    """A slip of the hand must not cost a database, or the stage just made of it."""
+    if not path.is_file():
+        return
+    with path.open("rb") as file:
+        begun = file.read(64)
+    if begun and not re.match(rb'\s*\{\s*"format": *"hdrusd-', begun):
+        raise HdrusdError(f"{path}: not an earlier report; want another name for --report")
+
+
 def _report_place(ctx: click.Context, option: click.Parameter, path: Path | None) -> Path | None:
     """Said before the work and not after it: that a report cannot be written there."""
     if path is None:
         return None
     if path.exists() and not path.is_file():
         raise HdrusdError(f"{path}: not a regular file; see --report")
+    _spare(path)
     above = next(folder for folder in path.absolute().parents if folder.exists())
     try:
         with tempfile.TemporaryFile(dir=above):
@@ -126,7 +152,8 @@ def tell(report: Report, quiet: bool) -> None:
 
 
 def write_report(path: Path, document: dict[str, Any]) -> None:
-    """Write JSON under a temporary name, then rename."""
+    """Write JSON under a temporary name, then rename. Raises HdrusdError for what is no report."""
+    _spare(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:

@@ -57,6 +57,8 @@ def init(
     printed = str(output) == "-"
     if not printed and output.is_dir():
         raise click.UsageError(f"{output}: a folder; want the name of a file")
+    if not printed and output.exists() and output.samefile(source):
+        raise click.UsageError(f"{output}: the database itself; want another OUTPUT")
     if not printed and output.exists() and not overwrite:
         raise HdrusdError(f"{output}: exists; want another OUTPUT, or --overwrite")
     report = Report()

@@ -27,6 +27,7 @@ from .eye_options import (
 )
 from .options import (
     FILE,
+    NumberRange,
     chosen_operator,
     finish,
     operator_options,
@@ -96,7 +97,7 @@ COMPLEXITIES |= {"1.0": 0, "1.1": 1, "1.2": 2, "1.3": 3}
 )
 @click.option(
     "--gamma",
-    type=click.FloatRange(0.1, 10.0),
+    type=NumberRange(0.1, 10.0),
     default=2.2,
     show_default=True,
     help="Exponent that decodes 8-bit textures marked sRGB.",

@@ -26,6 +26,7 @@ from .eye_options import (
     plot_file,
 )
 from .options import (
+    NumberRange,
     chosen_operator,
     finish,
     operator_options,
@@ -53,13 +54,13 @@ from .options import (
 )
 @click.option(
     "--fps",
-    type=click.FloatRange(0.01, 1000.0),
+    type=NumberRange(0.01, 1000.0),
     help="Frames a second. [default: what the frames say, else 24]",
 )
 @click.option(
     "--field",
     "across",
-    type=click.FloatRange(0.1, 179.0),
+    type=NumberRange(0.1, 179.0),
     metavar="DEGREES",
     help="Width of the view. [default: the camera's that the frame states, else the screen's, "
     "else 40 for the larger side]",

@@ -17,15 +17,18 @@ from hdrusd.photometry.sidecar import Rule, Sidecar
 _EVERYWHERE = 180.0
 
 
-def add_lamps(scene: LegacyScene, sidecar: Sidecar) -> dict[int, Rule]:
-    """Hang the lamps into ``scene``; the rule of each new light by its index."""
+def add_lamps(scene: LegacyScene, sidecar: Sidecar, up: str) -> dict[int, Rule]:
+    """Hang the lamps into ``scene``; the rule of each new light by its index.
+
+    ``up``: "Y" or "Z", against which lamps without an axis shine.
+    """
     rules: dict[int, Rule] = {}
     nodes = _nodes(scene)  # before any is added
     for rule in sidecar.rules:
         if rule.section != "lamp":
             continue
         index = len(scene.lights)
-        scene.lights.append(_light(rule, scene.up))
+        scene.lights.append(_light(rule, up))
         rules[index] = rule
         places = rule.values.get("at", ())
         if places:

@@ -12,10 +12,10 @@ from pxr import Sdf, Usd
 
 from hdrusd.account.images import image_rows
 from hdrusd.account.reflectances import Reflectances
-from hdrusd.account.wear import worn
+from hdrusd.account.wear import wearers, worn
 from hdrusd.added_lamps import add_lamps
 from hdrusd.conversion import Options, Result
-from hdrusd.delivery import check_output, move_into_place, work_folder
+from hdrusd.delivery import check_output, check_path, move_into_place, work_folder
 from hdrusd.errors import InputError, SourceRef, ValidationError
 from hdrusd.importers.importer import Resolver
 from hdrusd.importers.importer import read as read_legacy
@@ -55,6 +55,8 @@ def convert(source: Path, output: Path, options: Options, report: Report | None 
     check_output(output, OUTPUT_SUFFIXES)
     if not source.is_file():
         raise InputError(source, "no such file")
+    # OUTPUT names a stage with its folders, a database by its name.
+    check_path(source.absolute() if source.suffix.lower() in STAGES else Path(source.name))
     with work_folder(output) as folder:
         if source.suffix.lower() in STAGES:
             sidecar = _find_sidecar(source, options, report)
@@ -79,7 +81,8 @@ class _Conversion:
         resolver = Resolver(source, report, options.roots, options.search, options.limits)
         self.scene = read_legacy(resolver, report)
         self.result = Result(output, report, self.scene.counts(), source=source)
-        self.added = add_lamps(self.scene, self.sidecar)
+        up = options.up or self.scene.up
+        self.added = add_lamps(self.scene, self.sidecar, up)
         stem = output.stem
         files = folder / f"{stem}.textures", f"./{stem}.textures"
         self.maps = MapWriter(*files, report)
@@ -95,7 +98,7 @@ class _Conversion:
             report,
             meters_per_unit=options.meters_per_unit,
             source_unit=options.source_unit or self.scene.unit_m,
-            up=options.up or self.scene.up,
+            up=up,
         )
         self.surfaces: list[Surface] = []
 
@@ -182,7 +185,8 @@ class _Conversion:
         materials[material] = replace(materials[material], diffuse_map=texture)
         writer = self.writer
         scales = area_scales(writer.stage, writer.meshes, writer.tree.copies)
-        return worn(replace(self.scene, materials=materials), scales, material).uv
+        scene = replace(self.scene, materials=materials)
+        return worn(scene, scales, material, wearers(scene).get(material, ())).uv
 
     # -- cameras, nodes, checks ------------------------------------------------------------
 
@@ -211,12 +215,14 @@ class _Conversion:
         result.diagonal, result.ground = self.writer.diagonal(), footprint(stage)
         result.unit_stated = self.options.source_unit is not None
         scales = area_scales(stage, self.writer.meshes, self.writer.tree.copies)
+        meshes = wearers(self.scene)
         judge = Reflectances(self.maps.overview, self.report)
         pairs = zip(self.scene.materials, self.surfaces, result.materials, strict=True)
         for index, (material, surface, row) in enumerate(pairs):
             file = surface.diffuse_map.file.rpartition("/")[2] if surface.diffuse_map else ""
             factor = cast("list[float] | None", self.maps.written.get(file, {}).get("diffuse"))
-            row |= judge.row(material, surface, worn(self.scene, scales, index), factor)
+            found = worn(self.scene, scales, index, meshes.get(index, ()))
+            row |= judge.row(material, surface, found, factor)
         areas = [row["area_m2"] for row in result.materials]
         result.images = image_rows(self.scene.materials, self.surfaces, areas, result.textures)
 

@@ -17,7 +17,7 @@ from hdrusd.photometry.light import PhotometricLight, chromaticity
 from hdrusd.photometry.sidecar import Rule, Sidecar
 from hdrusd.photometry.spread import SHAPES
 from hdrusd.report import Kind, Report
-from hdrusd.skies import Sky, SkyFiles
+from hdrusd.skies import Sky, SkyFiles, even_sky
 from hdrusd.usd.fixtures import Lamp
 from hdrusd.usd.preset_sky import write_sky_dome, write_sky_sun
 from hdrusd.usd.transform import across
@@ -128,7 +128,7 @@ class LampMaker:
 
         axis, right = rule.three("axis"), rule.three("c0")
         if axis is None and lamp.source.kind == "point":
-            note(Kind.ASSUMED, "gamma = 0 points along the light's -Z; axis says otherwise")
+            note(Kind.ASSUMED, f"gamma = 0 points along {_way(lamp.source)}; axis says otherwise")
         source = lamp.source
         if axis is not None:
             source = replace(source, direction=axis, directions=None)
@@ -146,7 +146,7 @@ class LampMaker:
             return lamp
         axis = rule.three("axis")
         if axis is None:
-            text = "shines into the half space along the light's -Z; axis says otherwise"
+            text = f"shines into the half space along {_way(lamp.source)}; axis says otherwise"
             self.report.add(Kind.ASSUMED, "light-aim", rule.place, lamp.source.name, text)
             return lamp
         return replace(lamp, source=replace(lamp.source, direction=axis, directions=None))
@@ -158,16 +158,7 @@ class LampMaker:
             color = rule_color(rule, temperature_rgb)
             if "preset" in rule.values:
                 return self.skies.make(rule, color)
-            return Sky(
-                PhotometricLight(
-                    "ambient",
-                    rule.number("illuminance") or 0.0,
-                    color or (1.0, 1.0, 1.0),
-                    provenance=rule.provenance,
-                    rule=str(rule.place),
-                    source=rule.source,
-                )
-            )
+            return even_sky(rule, color)
         ambient = self._ambient(from_lights)
         return None if ambient is None else Sky(ambient)
 
@@ -232,6 +223,11 @@ class LampMaker:
                 )
             if not it.looked_at:
                 note("fixture-search", "too much about it to look for its fixture")
+
+
+def _way(light: legacy.Light) -> str:
+    x, y, z = light.direction
+    return f"({x:g}, {y:g}, {z:g}) of its node"
 
 
 def temperature_rgb(kelvin: float) -> legacy.RGB:

@@ -27,6 +27,7 @@ from hdrusd.errors import InputError, SourceRef
 from hdrusd.images import MAX_PIXELS, read_small_image, write_exr, write_png
 from hdrusd.legacy.scene import RGB, Image, Texture
 from hdrusd.map_threads import MapThreads
+from hdrusd.photometry.baked import OVERVIEW
 from hdrusd.photometry.reflectance import coded_reflectance, reflectance_table
 from hdrusd.report import Kind, Report
 from hdrusd.units import LUMINANCE_WEIGHTS
@@ -38,9 +39,6 @@ _PORTABLE = {".png", ".jpg", ".jpeg", ".exr"}
 #: Above this a half float has no value.
 _HALF_MAX = 65504.0
 
-#: Texels a side of a picture as statistics see it.
-_OVERVIEW = 2048
-
 #: Bytes of decoded pictures that are kept for the next material.
 _KEPT = 512 << 20
 
@@ -51,6 +49,9 @@ _MAGIC = 8
 _SMALL = 1 << 24
 
 Floats = npt.NDArray[np.float64]
+
+#: Of a picture's width and height, rows and columns (n,) of the texels that are wanted.
+Places = Callable[[int, int], tuple[npt.NDArray[Any], npt.NDArray[Any]]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +71,8 @@ class MapWriter:
         self.report = report
         self.written: dict[str, dict[str, object]] = {}  # file -> what it is, for the report
         self._pictures: OrderedDict[str, _Picture | None] = OrderedDict()
+        self._kept = 0  # bytes of them
+        self._keys: dict[int, tuple[Image, str]] = {}  # of pictures in memory, by id()
         self._looks: dict[str, str] = {}
         self._threads: MapThreads[_Picture | InputError | None] | None = None
 
@@ -203,14 +206,21 @@ class MapWriter:
         color = picture.pixels.dtype == np.uint8 and picture.pixels.shape[2] >= 3
         return picture.integers if stated else color
 
-    def overview(self, image: Image, gamma: float) -> tuple[Floats, Floats | None] | None:
-        """T^gamma (h, w, 3) and alpha (h, w) or None, every k-th texel of what is too large."""
+    def overview(
+        self, image: Image, gamma: float, places: Places | None = None
+    ) -> tuple[Floats, Floats | None] | None:
+        """T^gamma (h, w, 3) and alpha (h, w) or None, every k-th texel of what is too large.
+
+        ``places``: of its width and height, rows and columns (n,); (1, n) there alone.
+        """
         key = self._key(image)
         picture = None if key is None else self._read(image, key)
         if picture is None:
             return None
-        step = -(-max(picture.pixels.shape[:2]) // _OVERVIEW)
+        step = -(-max(picture.pixels.shape[:2]) // OVERVIEW)
         pixels = picture.pixels[::step, ::step]
+        if places is not None:
+            pixels = pixels[places(pixels.shape[1], pixels.shape[0])][None]
         color = linear(_Picture(pixels, picture.integers), gamma)
         if pixels.shape[2] not in (2, 4):
             return color, None
@@ -257,18 +267,18 @@ class MapWriter:
             return None
         if image.path is not None:
             return str(image.path)
-        data = image.data if image.data is not None else _bytes(image.pixels)
-        return hashlib.sha256(data).hexdigest()
+        if id(image) not in self._keys:
+            data = image.data if image.data is not None else _bytes(image.pixels)
+            self._keys[id(image)] = image, hashlib.sha256(data).hexdigest()
+        return self._keys[id(image)][1]
 
     def _read(self, image: Image, key: str) -> _Picture | None:
         if key not in self._pictures:
             self._pictures[key] = self._decode(image, key)
-            while self._size() > _KEPT and len(self._pictures) > 1:
-                self._pictures.popitem(last=False)
+            self._kept += _size(self._pictures[key])
+            while self._kept > _KEPT and len(self._pictures) > 1:
+                self._kept -= _size(self._pictures.popitem(last=False)[1])
         return self._pictures[key]
-
-    def _size(self) -> int:
-        return sum(p.pixels.nbytes for p in self._pictures.values() if p is not None)
 
     def _decode(self, image: Image, key: str) -> _Picture | None:
         found = None if self._threads is None else self._threads.take(key)
@@ -278,6 +288,10 @@ class MapWriter:
             self.report.add(Kind.INVALID, "image-broken", image.source, image.name, found.problem)
             return None
         return found
+
+
+def _size(picture: _Picture | None) -> int:
+    return 0 if picture is None else picture.pixels.nbytes
 
 
 def _decoded(image: Image, most: int) -> _Picture | InputError | None:

@@ -29,6 +29,20 @@ class Sky:
     towards: tuple[float, float, float] = (0.0, 1.0, 0.0)
 
 
+def even_sky(rule: Rule, color: RGB | None) -> Sky:
+    """The sky of an ``[ambient]`` that states lux alone: alike from everywhere."""
+    return Sky(
+        PhotometricLight(
+            "ambient",
+            rule.number("illuminance") or 0.0,
+            color or (1.0, 1.0, 1.0),
+            provenance=rule.provenance,
+            rule=str(rule.place),
+            source=rule.source,
+        )
+    )
+
+
 class SkyFiles:
     """Writes pictures into ``folder``, which the layers call ``prefix``."""
 
@@ -57,8 +71,11 @@ class SkyFiles:
             provenance="estimated" if stated is None else rule.provenance,
             rule=f"{BY_CLASS}sky {preset.name}, {rule.place}"
             if stated is None
-            else str(rule.place),
-            source="; ".join(part for part in (rule.source, preset.source) if part),
+            else f"{rule.place}, sky {preset.name}",
+            # A stated number is not the preset's, nor is its source.
+            source="; ".join(part for part in (rule.source, preset.source) if part)
+            if stated is None
+            else rule.source,
         )
         sun = None
         if made.beam > 0.0:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from pxr import Usd, UsdShade
-from report_schema import problems
+from report_schema import problems, undescribed
 
 from hdrusd.conversion import Options, Result
 from hdrusd.convert import convert
@@ -19,9 +19,11 @@ _STAGES: deque[Usd.Stage] = deque(maxlen=4)
 
 
 def run(source: Path, output: Path | None = None, **options: Any) -> Result:
-    """Convert beside the source, or to ``output``; the report must fit its schema."""
+    """Convert beside the source, or to ``output``; the schema must know all of the report."""
     result = convert(source, output or source.with_suffix(".usda"), Options(**options))
-    assert problems(result.as_dict()) == []
+    document = result.as_dict()
+    assert problems(document) == []
+    assert undescribed(document) == set()
     return result
 
 

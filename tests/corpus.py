@@ -37,7 +37,7 @@ import numpy as np
 
 from hdrusd.images import read_exr
 from hdrusd.importers.importer import SUFFIXES as LEGACY
-from hdrusd.overlay.stage import SUFFIXES as STAGES
+from hdrusd.usd.source_stage import STAGES
 
 from .gallery import PRIVATE, write_sheets
 
@@ -328,11 +328,11 @@ def write_gallery(rows: Iterable[Row], output: Path, gallery: Path, *, public: b
 
 
 def totals(rows: Sequence[Row]) -> str:
-    """One line: how many pictures, refusals and failures."""
+    """One line: how many pictures, refusals and failures; a stage has two runs."""
     wrong = sum(bool(row.problem) for row in rows)
     refused = sum(not row.problem and row.code != 0 for row in rows)
     pictures = len(rows) - wrong - refused
-    return f"{len(rows)} files: {pictures} pictures, {refused} refused, {wrong} wrong."
+    return f"{len(rows)} runs: {pictures} pictures, {refused} refused, {wrong} wrong."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

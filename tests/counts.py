@@ -24,7 +24,7 @@ from hdrusd.convert import convert
 from hdrusd.errors import InputError
 from hdrusd.importers.importer import Resolver, read
 from hdrusd.legacy.scene import LegacyScene, Node
-from hdrusd.overlay.stage import SUFFIXES as STAGES
+from hdrusd.usd.source_stage import STAGES
 from hdrusd.report import Report
 
 COLUMNS = ("meshes", "triangles", "materials", "textures", "lights")

@@ -27,4 +27,8 @@ def undescribed(document: dict[str, Any]) -> set[str]:
     for key, name in (tables | {"findings": "finding"}).items():
         known = SCHEMA["$defs"][name]["properties"].keys()
         found |= {f"{key}.{k}" for row in document.get(key, []) for k in row.keys() - known}
+    known = SCHEMA["properties"]["textures"]["additionalProperties"]["properties"].keys()
+    found |= {
+        f"textures.{k}" for row in document.get("textures", {}).values() for k in row.keys() - known
+    }
     return found

@@ -6,20 +6,27 @@ import json
 import subprocess
 import sys
 import tomllib
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-from builders import gltf_lights, obj, png
+from builders import gltf_lights, obj, one_square, osgt_light, paint, picture, png, square
 from converted import POINT, SPOT, lights, material, opened, run, sidecar
 from jsonschema import Draft202012Validator
 from report_schema import SCHEMA, problems, undescribed
 
-from hdrusd.account.fix_first import MOST
+from hdrusd.account.fix_first import MOST, Scene, fix_first
+from hdrusd.account.images import image_rows
+from hdrusd.account.lights import group_pattern
+from hdrusd.account.reflectances import toml_entry
 from hdrusd.account.text import summary
+from hdrusd.account.wear import wearers, worn
 from hdrusd.conversion import Result
+from hdrusd.legacy.scene import Subset, Texture
+from hdrusd.usd.material import Surface
 
 GREY = np.full((64, 64, 3), 100, np.uint8)
 
@@ -168,7 +175,7 @@ def test_pictures_by_class(tmp_path: Path) -> None:
     assert found.pop("asphalt.png") == ("reflectance", None)
     assert found.pop("glow.png") == ("emission", None)
     assert found.pop("hole.png") == ("opacity", None)
-    assert found.get("road_normal.png", ("data", None)) in [("unused", "data"), ("data", None)]
+    assert found == {"road_normal.png": ("unused", "data"), "shine.png": ("unused", "data")}
     totals = result.as_dict()["totals"]
     assert totals["textures_by_class"]["reflectance"] == 1
     (row,) = (row for row in result.images if row["name"] == "glow.png")
@@ -306,17 +313,130 @@ def test_the_schema_forbids_what_is_wrong(tmp_path: Path) -> None:
     assert len(problems(document)) == 3
 
 
-@pytest.mark.parametrize("light", [{}, {"provenance": "estimated"}])
-def test_a_copied_line_is_trusted_no_more_than_before(
-    tmp_path: Path, light: dict[str, str]
+@pytest.mark.parametrize(("unit", "levels"), [(True, ("medium",) * 2), (False, ("none", "low"))])
+def test_a_copied_line_is_a_guess_where_it_was_one(
+    tmp_path: Path, unit: bool, levels: tuple[str, str]
 ) -> None:
-    if light:  # somebody's guess
-        sidecar(tmp_path, '[[light]]\nmatch = "point"\ncandela = 5\nprovenance = "estimated"\n')
-    source = gltf_lights(tmp_path / "a.gltf", [POINT])
+    lamp = gltf_lights(tmp_path / "a.gltf", [POINT])
+    source = lamp if unit else osgt_light(tmp_path / "a.osgt")
     before = run(source)
     (entry,) = before.as_dict()["fix_first"]
     sidecar(tmp_path, entry["write"])
     after = run(source)
-    assert after.lights[0]["confidence"] == before.lights[0]["confidence"]
+    assert (before.lights[0]["confidence"], after.lights[0]["confidence"]) == levels
     # Four digits are written.
     assert after.lights[0]["value"] == pytest.approx(before.lights[0]["value"], rel=5e-4)
+
+
+def fixes(folder: Path, text: str, shape: str = "v -9 0 9\nv 9 0 9\nv 9 0 -9\nv -9 0 -9") -> Any:
+    """What to fix first of a grey square with a photometry file."""
+    sidecar(folder, text)
+    (folder / "a.mtl").write_text("newmtl grey\nKd 0.5 0.5 0.5\nnewmtl sky\nKd 0 0 0\nKe 1 1 1\n")
+    (folder / "a.obj").write_text(f"mtllib a.mtl\n{shape}\nusemtl grey\nf 1 2 3 4\n")
+    return run(folder / "a.obj", source_unit=1.0).as_dict()["fix_first"]
+
+
+@pytest.mark.parametrize("stated", ["", "illuminance = 0.2\n"])
+def test_a_preset_is_mended_where_it_stands(tmp_path: Path, stated: str) -> None:
+    for entry in fixes(tmp_path, f'[ambient]\npreset = "moonlit"\n{stated}'):
+        assert entry["write"] is None  # no [[light]] fits the moon, and [ambient] is there
+        assert entry["why"].endswith("; the number stands in ambient there")
+
+
+def test_a_number_of_the_file_is_mended_in_its_entry(tmp_path: Path) -> None:
+    text = "; the number stands in {}[1] there"
+    sidecar(tmp_path, '[[light]]\nmatch = "spot"\ncandela = 2000\ntemperature = 3000\n')
+    (entry,) = run(gltf_lights(tmp_path / "a.gltf", [SPOT])).as_dict()["fix_first"]
+    assert (entry["write"], entry["why"].endswith(text.format("light"))) == (None, True)
+    sidecar(tmp_path, '[[material]]\nmatch = "*"\nlumens = 9\nprovenance = "estimated"\n')
+    glass = run(obj(tmp_path / "b.obj", "Kd 1 1 1"), source_unit=1.0).as_dict()["fix_first"]
+    (entry,) = (e for e in glass if e["what"].startswith("paint"))
+    assert (entry["write"], entry["why"].endswith(text.format("material"))) == (None, True)
+
+
+def test_a_wall_has_light_though_nothing_is_below_it(tmp_path: Path) -> None:
+    wall = "v -9 0 0\nv 9 0 0\nv 9 9 0\nv -9 9 0"
+    (sun, sky) = fixes(tmp_path, '[ambient]\npreset = "clear-sun"\n', wall)
+    assert (sun["what"][:4], sky["what"][:4]) == ("Sun:", "Sky:")
+    # 127,500 exp(-0.21 / sin 45) lx of the sun, 0.8 + 15.5 sqrt(sin 45) klx of the sky; half.
+    beam = 127_500 * np.exp(-0.21 * np.sqrt(2))
+    share = beam / (beam + 800 + 15_500 * 0.5**0.25)
+    assert sun["impact"] == pytest.approx(0.5 * share, abs=1e-4)
+
+
+def test_what_glows_takes_nothing_from_a_lamps_share(tmp_path: Path) -> None:
+    dome = (
+        "v -9 0 9\nv 9 0 9\nv 9 0 -9\nv -9 0 -9\nv -5e3 0 0\nv 5e3 0 0\nv 5e3 5e3 0\nv -5e3 5e3 0\n"
+        "usemtl sky\nf 5 6 7 8"
+    )
+    guess = '[[lamp]]\nat = [[0, 5, 0]]\ncandela = 400\nprovenance = "estimated"\n'
+    impacts = {e["what"].partition(":")[0]: e["impact"] for e in fixes(tmp_path, guess, dome)}
+    assert impacts["Lamp"] == 0.5  # all of the light, half a decade
+    assert impacts["sky"] == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("names", "pattern"),
+    [
+        (("ls0", "ls1", "ls12"), "ls*"),
+        (("ls0", "ls1", "lsx"), "ls[0-9]*"),
+        (("ls0", "ls1", "ls2x"), "ls0"),
+        (("ls0", "ls1", "board"), "ls*"),
+        (("ls[0", "ls[1", "board"), "ls[[]*"),
+    ],
+)
+def test_a_pattern_fits_a_group_and_no_other(names: tuple[str, ...], pattern: str) -> None:
+    others = names[2:] if names[2] != "ls12" else ()
+    group = [{"name": name} for name in names if name not in others]
+    assert group_pattern(group, sorted(names)) == pattern
+    fitting = {name for name in names if fnmatchcase(name, pattern)}
+    assert fitting <= {row["name"] for row in group}
+    assert fitting == {row["name"] for row in group} or pattern == "ls0"
+
+
+def test_an_entry_is_toml_whatever_the_name() -> None:
+    name = "".join(map(chr, range(1, 256))) + "\U0001f6a6"
+    (entry,) = tomllib.loads(toml_entry("light", name, candela=1e30))["light"]
+    assert fnmatchcase(name, entry["match"])
+    assert entry["candela"] == 1e30
+
+
+def test_a_material_is_looked_for_on_its_own_meshes_alone() -> None:
+    parts = [Subset(1, np.array([0], np.int32))]
+    scene = one_square(
+        meshes=[square(), square(material=None, subsets=parts), square(material=1)],
+        materials=[paint(), paint(name="b")],
+    )
+    meshes = wearers(scene)
+    assert meshes == {0: [0], 1: [1, 2], None: [1]}
+    found = worn(scene, {0: 1.0, 1: 2.0, 2: 3.0}, 1, meshes[1])
+    assert (found.faces, found.area) == (2, 5.0)
+
+
+def test_pictures_are_shared_by_materials_of_one_name(tmp_path: Path) -> None:
+    image = picture()
+    materials = [paint(diffuse_map=Texture(image)), paint(diffuse_map=Texture(image))]
+    surfaces = [Surface(diffuse=(1.0, 1.0, 1.0), gamma=2.2)] * 2
+    (row,) = image_rows(materials, surfaces, [1.0, 3.0], {})
+    assert (row["materials"], row["share"]) == (["paint"], 1.0)
+
+
+@pytest.mark.parametrize(
+    ("code", "kind", "taken"),
+    [
+        ("obj-units", "assumed", "1 m"),
+        ("fbx-unit", "assumed", "1 cm"),
+        ("fbx-axes", "replaced", None),  # turned, which is no unit
+        ("flt-unit", "assumed", "1 m"),
+        ("flt-unit", "replaced", None),  # one file in another's unit, both stated
+    ],
+)
+def test_a_unit_is_doubted_where_the_reader_took_one(
+    code: str, kind: str, taken: str | None
+) -> None:
+    material = {"area_m2": 1.0, "luminance_cd_m2": 0.0, "doubts": []}
+    finding = {"code": code, "kind": kind, "thing": "", "text": ""}
+    entries = fix_first(Scene([], [material], [], [finding], ground=9.0, diagonal=9.0))
+    said = [e["what"] for e in entries if e["what"].startswith("unit of length")]
+    wanted = f"unit of length: the source has none, {taken} is taken; all is 9 m across"
+    assert said == ([wanted] if taken else [])

@@ -80,6 +80,21 @@ def test_a_node_gets_its_lamp(tmp_path: Path) -> None:
         assert list(down) == pytest.approx([0, -1, 0], abs=1e-6)
 
 
+@pytest.mark.parametrize("up", ["Y", "Z"])
+@pytest.mark.parametrize("shape", ["cutoff = 60", 'lumens = 9\nspread = "lambert"'])
+def test_a_lamp_without_an_axis_shines_down(tmp_path: Path, up: str, shape: str) -> None:
+    source = floor(tmp_path)
+    sidecar(tmp_path, f"[[lamp]]\nat = [[0, 5, 5]]\n{shape}\n")
+    result = run(source, up=up)
+    (prim,) = (prim for prim in opened(result).Traverse() if prim.GetTypeName() == "SphereLight")
+    way = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0).TransformDir((0, 0, -1))
+    down = [0, -1, 0] if up == "Y" else [0, 0, -1]
+    assert list(way) == pytest.approx(down, abs=1e-6)
+    told = [f.text for f in result.report if f.code == "light-aim"]
+    assert all("({}, {}, {})".format(*down) in text for text in told)
+    assert len(told) == ("lambert" in shape)
+
+
 def test_the_floor_below_is_lit(gl: Any, tmp_path: Path) -> None:
     source = floor(tmp_path)
     sidecar(

@@ -155,6 +155,13 @@ def test_what_a_lamps_type_says_is_told_and_marked(tmp_path: Path) -> None:
     assert red > 1.0 > green > blue
 
 
+def test_guessed_watts_are_worth_no_more_than_a_guess(tmp_path: Path) -> None:
+    guess = 'watts = 70\nlamp = "high-pressure-sodium"\nprovenance = "estimated"'
+    row = rows(converted(tmp_path, guess))["point"]
+    assert (row["confidence"], row["flux_lm"]) == ("low", pytest.approx(6300.0))
+    assert "lamp type high-pressure-sodium, 70 W at 90 lm/W" in row["rule"]
+
+
 @pytest.mark.parametrize(
     ("stated", "left"),
     [

@@ -117,3 +117,13 @@ def test_an_altitude_that_a_sky_cannot_have(tmp_path: Path, text: str) -> None:
     assert finding.thing == "altitude"
     name = text.split('"')[1]
     assert rows(result)["Sky"]["value"] == PRESETS[name].sky().illuminance
+
+
+def test_a_stated_number_is_not_the_presets(tmp_path: Path) -> None:
+    said = 'preset = "moonlit"\nilluminance = 0.2'
+    found = rows(sky(tmp_path, said))
+    for name in ("Sky", "Sun"):
+        assert (found[name]["source"], found[name]["confidence"]) == ("", "medium")
+        assert found[name]["rule"] == "photometry.toml:ambient, sky moonlit"
+    measured = rows(sky(tmp_path, f'{said}\nsource = "meter, 3 May"'))["Sky"]
+    assert (measured["source"], measured["confidence"]) == ("meter, 3 May", "high")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from converted import (
     texture_file,
     texture_node,
 )
-from pxr import Gf, Usd, UsdLux
+from pxr import Gf, Usd, UsdLux, UsdShade
 
 from hdrusd.conversion import Result
 from hdrusd.images import read_exr, read_image
@@ -45,6 +46,19 @@ def test_a_texture_becomes_a_linear_reflectance_map(tmp_path: Path) -> None:
     assert prim.GetAttribute("photometric:diffuse").Get() == Gf.Vec3f(0.5, 1.0, 0.25)
     kept = Path(prim.GetAttribute("photometric:sourceTexture").Get().resolvedPath)
     assert kept.read_bytes() == (tmp_path / "wall.png").read_bytes()
+
+
+def test_a_missing_picture_and_a_name_that_usd_has_not_are_kept(tmp_path: Path) -> None:
+    (tmp_path / "broken.png").write_text("no picture")
+    file = obj(tmp_path / "wall.obj", "map_Kd maps\\Wall.TGA\nmap_Ke broken.png")
+    library = tmp_path / "wall.mtl"
+    library.write_text(library.read_text().replace("paint", "wände"))
+    file.write_text(file.read_text().replace("paint", "wände"))
+    (prim,) = (p for p in opened(run(file)).Traverse() if p.IsA(UsdShade.Material))
+    assert prim.GetDisplayName() == "wände"
+    kept = json.loads(prim.GetCustomDataByKey("hdrusd:extras"))
+    assert kept["diffuse_map"] == "maps\\Wall.TGA"
+    assert kept["emission_map"] == "broken.png"
 
 
 @pytest.mark.parametrize(("option", "gamma"), [(None, 1.8), (2.4, 2.4)])

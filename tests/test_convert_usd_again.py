@@ -181,6 +181,21 @@ def test_instances_beyond_counting_are_refused_at_once(tmp_path: Path) -> None:
         run(tmp_path / "16.usda", tmp_path / "night.usda")
 
 
+def test_instances_too_deep_in_one_another_are_refused(tmp_path: Path) -> None:
+    def chain(count: int) -> Path:
+        made = [f'class Xform "C0"\n{{\n{LAMP}\n}}']
+        for level in range(1, count + 1):
+            below = f"(\n    instanceable = true\n    references = </World/C{level - 1}>\n)\n{{\n}}"
+            kind = "def" if level == count else "class"
+            made.append(f'{kind} Xform "C{level}"\n{{\ndef "I" {below}\n}}')
+        return stage_file(tmp_path / f"{count}.usda", *made)
+
+    result = run(chain(64), tmp_path / "night.usda")
+    assert [row["name"] for row in result.lights] == ["Lamp"]
+    with pytest.raises(InputError, match="2000 instances in one another; want at most 64"):
+        run(chain(2000), tmp_path / "deep.usda")
+
+
 # -- real stages ---------------------------------------------------------------------------
 
 #: Of their files by ``grep``: lights, materials.

@@ -129,6 +129,25 @@ def test_a_lamp_that_blinks_blinks_in_candela(tmp_path: Path) -> None:
         assert values == pytest.approx({0: 0.0, 10: peak, 12: peak / 4}, rel=CLOSE)
 
 
+def test_what_varies_on_no_straight_line_is_right_between_its_samples(tmp_path: Path) -> None:
+    """2^exposure is 32 halfway from 0 to 10 stops; red to green has both halves halfway."""
+    fixed = "float inputs:radius = 0.1\nfloat inputs:intensity = 1\n"
+    stops = lamp("SphereLight", f"{fixed}float inputs:exposure.timeSamples = {{ 0: 0, 10: 10 }}")
+    hues = "color3f inputs:color.timeSamples = { 0: (1, 0, 0), 4: (0, 1, 0) }"
+    grows = "float inputs:intensity = 1\nfloat inputs:radius.timeSamples = { 0: 1, 2: 3 }"
+    lamps = stops, lamp("SphereLight", fixed + hues, "Hue"), lamp("SphereLight", grows, "Grows")
+    result = convert(tmp_path, *lamps)
+    assert [f.code for f in result.report].count("usd-light-resampled") == 3
+    for code in range(11):
+        nits = light(result).GetAttribute("inputs:intensity").Get(code)
+        assert nits == pytest.approx(2.0**code, rel=CLOSE)
+    hue = light(result, "Hue")
+    nits, color = (hue.GetAttribute(f"inputs:{name}").Get(2) for name in ("intensity", "color"))
+    assert tuple(nits * channel for channel in color) == pytest.approx((0.5, 0.5, 0.0), rel=CLOSE)
+    candela = light(result, "Grows").GetAttribute("inputs:photometric:luminousIntensity")
+    assert candela.Get(1) == pytest.approx(4.0 * math.pi, rel=CLOSE)
+
+
 def test_time_codes_are_those_of_a_source_with_another_rate(tmp_path: Path) -> None:
     """Layers that differ in timeCodesPerSecond would have their time stretched."""
     head = '#usda 1.0\n(\n    defaultPrim = "World"\n    metersPerUnit = 1\n    upAxis = "Z"\n'

@@ -11,7 +11,7 @@ import OpenImageIO as oiio
 import pytest
 
 from tests import corpus, gallery
-from tests.corpus import Row, corpus_files, markdown, run_corpus, totals
+from tests.corpus import CONVERTED, Row, corpus_files, markdown, run_corpus, totals
 
 #: Small real files: each format, texture folders beside the meshes, lights, cameras, packages.
 REAL = (
@@ -31,41 +31,66 @@ REAL = (
     "usd-wg/test_assets/TextureTransformTest/TextureTransformTest.usd",
 )
 
-#: What of the hostile files has nothing in it that can be trusted, and must be refused as input.
-BROKEN = (
-    "dag_two_parents.gltf",
-    "deep_push.flt",
-    "empty.3ds",
-    "empty.glb",
-    "empty.obj",
-    "empty.osgt",
-    "empty.usda",
-    "empty.usdc",
-    "extref_cycle_a.flt",
-    "huge_count.gltf",
-    "huge_glb_chunk.glb",
-    "node_cycle.gltf",
-    "png_named.obj",
-    "trunc_palm.flt",
-    "uri_file.gltf",
-    "zero_record.flt",
-)
+#: What of the hostile files has nothing in it that can be trusted, or nothing left that can be
+#: shown, and must be refused as input; and words of the line that says why.
+BROKEN = {
+    "bad_indices.obj": "nothing in it",
+    "billion_laughs.dae": "entity 'a'",
+    "bomb.zae": "big.dae: unpacks to more than 200 times its size",
+    "dag_two_parents.gltf": "node 3 is a child of nodes 1 and 2",
+    "deep_chain.gltf": "deeper than 256",
+    "deep_push.flt": "deeper than 256",
+    "empty.3ds": "0 bytes",
+    "empty.dae": "empty",
+    "empty.fbx": "Empty",
+    "empty.glb": "empty",
+    "empty.ive": "empty",
+    "empty.obj": "no vertex",
+    "empty.osgt": "empty",
+    "empty.usda": "not a USD layer",
+    "empty.usdc": "not a USD layer",
+    "extref_cycle_a.flt": "nothing in it",
+    "extref_cycle_b.flt": "nothing in it",
+    "huge_count.gltf": "4000000000 elements",
+    "huge_glb_chunk.glb": "cut short",
+    "lfs_pointer.osgb": "Git LFS pointer",
+    "nan_inf.obj": "nothing in it",
+    "nan_lights.gltf": "nothing in it",
+    "node_cycle.dae": "node 'a' contains itself",
+    "node_cycle.gltf": "a cycle",
+    "png_named.obj": "binary data",
+    "ref_cycle_a.usda": "nothing",
+    "ref_cycle_b.usda": "nothing",
+    "trunc_max.fbx": "Truncated",
+    "trunc_palm.flt": "record 70 of length 64",
+    "trunc_streetlight.osgb": "",
+    "uri_file.gltf": "/buffers/1: buffer file:///etc/passwd",
+    "zero_record.flt": "record 2 of length 0",
+}
 
-#: What of them is whole but for textures and names, and must still be shown.
-USABLE = (
-    "dev_zero.obj",
-    "huge_png.obj",
-    "long_line.obj",
-    "missing_tex.obj",
-    "names.obj",
-    "traversal_tex.obj",
-    "trunc_box.3ds",
-    "uri_traversal.gltf",
-)
+#: What of them is whole but for a part, textures or names, and must still be shown; the code of
+#: the finding that tells what is wrong ("": nothing is, but for names).
+USABLE = {
+    "dev_zero.obj": "file-refused",
+    "huge_fields.osgt": "osg-draw-count",
+    "huge_png.obj": "image-broken",
+    "long_line.obj": "vertex-numbers",
+    "missing_tex.obj": "file-missing",
+    "names.obj": "",
+    "traversal_tex.obj": "file-refused",
+    "trunc_box.3ds": "3ds-chunk-length",
+    "uri_traversal.gltf": "file-refused",
+}
+
+#: What of the hostile files another one names.
+PARTS = {".md", ".mtl", ".png", ".rgb", ".tga"}
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
 
-STAGE = '#usda 1.0\n( metersPerUnit = 1 )\ndef {kind} "Thing" {{}}\n'
+STAGE = (
+    '#usda 1.0\n(\n defaultPrim = "Thing"\n metersPerUnit = 1\n upAxis = "Y"\n)\n'
+    'def {kind} "Thing" {{}}\n'
+)
 
 
 def run(folder: Path, files: Sequence[Path], output: Path) -> dict[str, Row]:
@@ -105,19 +130,21 @@ def test_pictures_and_refusals_pass(source: Path, output: Path) -> None:
     (source / "notes.txt").write_text("no database")
     rows = run(source, corpus_files(source), output)
     assert problems(rows) == {}
-    assert list(rows) == ["black.obj", "empty.osgt", "nothing.usda", "sphere.usda", "square.obj"]
+    stages = [f"{name}.usda{way}" for name in ("nothing", "sphere") for way in ("", CONVERTED)]
+    assert list(rows) == ["black.obj", "empty.osgt", *stages, "square.obj"]
     assert rows["square.obj"].counts["triangles"] == 2
     assert rows["square.obj"].lit > 0.0
-    assert rows["sphere.usda"].lit > 0.0
+    assert rows["sphere.usda"].lit == rows[f"sphere.usda{CONVERTED}"].lit > 0.0
     assert rows["black.obj"].dark
     assert {name: row.code for name, row in rows.items() if row.code} == {
         "empty.osgt": 3,
         "nothing.usda": 3,
+        f"nothing.usda{CONVERTED}": 3,
     }
-    assert totals(list(rows.values())) == "5 files: 3 pictures, 2 refused, 0 wrong."
+    assert totals(list(rows.values())) == "7 runs: 4 pictures, 3 refused, 0 wrong."
     table = markdown(list(rows.values()))
     assert str(source) not in table
-    assert len(table.splitlines()) == 2 + 5 + 2
+    assert len(table.splitlines()) == 2 + 7 + 2
 
 
 @pytest.mark.usefixtures("gl")
@@ -195,13 +222,21 @@ print({json.dumps(json.dumps(answer))})
 
 @pytest.mark.usefixtures("gl")
 def test_hostile_files(testdata: Path, output: Path) -> None:
+    """Each ends as its kind must, a stage both ways, under the limits of the corpus run."""
     folder = testdata / "data"
+    everything = {path.name for path in (folder / "hostile").iterdir()}
+    assert {name for name in everything if Path(name).suffix not in PARTS} == {*BROKEN, *USABLE}
     files = corpus_files(folder, "hostile/*")
-    rows = {Path(name).name: row for name, row in run(folder, files, output).items()}
-    assert problems(rows) == {}
-    assert {name: rows[name].code for name in BROKEN} == dict.fromkeys(BROKEN, 3)
-    assert {name: rows[name].code for name in USABLE} == dict.fromkeys(USABLE, 0)
-    assert all(rows[name].findings for name in USABLE)
+    assert {file.name for file in files} == {*BROKEN, *USABLE}
+    rows = list(run_corpus(folder, files, output, workers=2))
+    assert [(row.name, row.problem) for row in rows if row.problem] == []
+    names = [(row.name.removeprefix("hostile/").removesuffix(CONVERTED), row) for row in rows]
+    wanted = [(name, 3 if name in BROKEN else 0) for name, _ in names]
+    assert [(name, row.code) for name, row in names] == wanted
+    broken = [(name, row.message) for name, row in names if name in BROKEN]
+    assert [one for one in broken if BROKEN[one[0]] not in one[1]] == []
+    usable = [(name, row.codes) for name, row in names if USABLE.get(name)]
+    assert [one for one in usable if USABLE[one[0]] not in one[1]] == []
 
 
 @pytest.mark.usefixtures("gl")

@@ -286,7 +286,7 @@ def test_a_stage_is_a_database_too(tmp_path: Path) -> None:
     assert [entry["match"] for entry in document["light"]] == ["Bulb"]
     assert document["light"][0]["lumens"] == BY_NAME["street-light"].typical
     assert [entry["match"] for entry in document["material"]] == ["Glow"]
-    assert '# match = "Sun"' in text  # nothing tells how strong it is
+    assert '# match = "Sun"\n# illuminance = 0' in text  # nothing tells how strong it is
     result = run(tmp_path / "a.usda", tmp_path / "out" / "b.usda")
     assert not [code for code in result.report.codes() if code.startswith("sidecar")]
     # What is photometric now needs no recipe any more.
@@ -294,3 +294,11 @@ def test_a_stage_is_a_database_too(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     again = tomllib.loads((tmp_path / "again.toml").read_text())
     assert set(again) == {"ambient"}
+
+
+def test_a_picture_is_looked_at_once() -> None:
+    image = texture().image
+    shared = [paint(name=f"m{n}", diffuse_map=replace(texture(), image=image)) for n in range(9)]
+    asked: list[str] = []
+    leads(one_square(materials=shared), lambda image: asked.append(image.name))
+    assert asked == ["wall.png"]

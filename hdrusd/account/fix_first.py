@@ -1,16 +1,19 @@
 """What to fix first: the few things in which a converted scene is likely to be most wrong.
 
-Impact is a share of the scene times the decades (log10) by which it may be off. Light counts
-by flux: lumens of lamps, pi L A of what glows, lux times the ground for what comes from afar.
-Surfaces count by area. An estimate from a colour may be off by a decade, one by a lamp's class
-by half of that, a stated number without a source by a tenth.
+Impact is a share of the scene times the decades (log10) by which it may be off. Lights count
+by flux, lumens of lamps and lux times the ground for what comes from afar; what glows, pi L A,
+counts among all of both, for it is seen but lights nothing. Surfaces count by area. An estimate
+from a colour may be off by a decade, one by a lamp's class by half of that, a stated number
+without a source by a tenth.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from hdrusd.account.lights import FACTOR, group_name, group_pattern, grouped
@@ -42,9 +45,16 @@ _KEPT = {
     "high": {},
 }
 
-#: Nobody knows whether 1 unit is 1 m: lux go with its square. Of a scene of a plausible size,
-#: m, it seldom is anything else; of another it must be.
-_UNIT_CODES = frozenset({"obj-units", "osg-axes", "3ds-units", "fbx-axes"})
+#: What a reader takes for the unit that nobody states: lux go with its square. Of a scene of a
+#: plausible size, m, it seldom is anything else; of another it must be.
+_UNITS_TAKEN = {
+    "obj-units": "1 m",
+    "osg-axes": "1 m",
+    "assimp-axes": "1 m",
+    "3ds-units": "1 m",
+    "flt-unit": "1 m",
+    "fbx-unit": "1 cm",
+}
 _SIZES = (0.5, 30_000.0)
 _PLAUSIBLE, _IMPLAUSIBLE = 0.15, 2.0
 
@@ -63,6 +73,9 @@ _LOOKED_AT = 0.1
 
 #: White stands in for a missing picture: real surfaces have a third of it.
 _MISSING = 0.5
+
+#: The entry of the photometry file that a rule names.
+_ENTRY = re.compile(r":((?:light|lamp|material)\[\d+\]|ambient)")
 
 PHOTOMETRY, COMMAND, SOURCE = "photometry.toml", "command line", "source"
 
@@ -88,7 +101,7 @@ class Entry:
         }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Scene:
     """What a ranking needs of a conversion. ``ground``: m2 below it; ``diagonal``: m;
     ``findings``: their JSON form.
@@ -106,19 +119,24 @@ class Scene:
     def flux(self, row: Row) -> float:
         """Lumens that a row of lights sends into the scene."""
         if row["kind"] in ("distant", "ambient"):
-            return float(row["value"] * self.ground)
+            return float(row["value"] * (self.ground or self.diagonal**2))
         return float((row["flux_lm"] or 0.0) * row["lamps"])
 
     def glow(self, row: Row) -> float:
         """Lumens of a material that glows on one side: pi L A."""
         return math.pi * float(row["luminance_cd_m2"]) * float(row["area_m2"])
 
-    @property
-    def lumens(self) -> float:
-        """Lumens of all together."""
-        return sum(map(self.flux, self.lights)) + sum(map(self.glow, self.materials))
+    @cached_property
+    def lit(self) -> float:
+        """Lumens of all lights."""
+        return sum(map(self.flux, self.lights))
 
-    @property
+    @cached_property
+    def lumens(self) -> float:
+        """Lumens of lights and of what glows."""
+        return self.lit + sum(map(self.glow, self.materials))
+
+    @cached_property
     def area(self) -> float:
         """m2 of all surfaces."""
         return float(sum(row["area_m2"] for row in self.materials))
@@ -133,7 +151,7 @@ def fix_first(scene: Scene) -> list[dict[str, Any]]:
 
 
 def _dark(scene: Scene) -> Iterator[Entry]:
-    if any(map(scene.flux, scene.lights)):
+    if any(row["value"] * row["lamps"] for row in scene.lights):
         return
     if scene.lumens > 0.0:
         what, impact = "nothing lights the scene: no light in the source", 1.0
@@ -146,10 +164,10 @@ def _dark(scene: Scene) -> Iterator[Entry]:
 
 
 def _lights(scene: Scene) -> Iterator[Entry]:
-    names = [row["name"] for row in scene.lights]
+    names = sorted(row["name"] for row in scene.lights)
     for group in grouped(scene.lights):
         row = group[0]
-        share = _share(sum(map(scene.flux, group)), scene.lumens)
+        share = _share(sum(map(scene.flux, group)), scene.lit)
         lamps = sum(r["lamps"] for r in group)
         value = float(f"{row['value']:.4g}")
         many = f"{lamps} lamps, " if lamps > 1 else ""
@@ -157,7 +175,11 @@ def _lights(scene: Scene) -> Iterator[Entry]:
         what = f"{group_name(group)}: {many}{value:g} {unit} by {row['rule'] or row['provenance']}"
         why = f"{_percent(share)} of the scene's light; {_TRUST[row['confidence']]}"
         pattern = group_pattern(group, names)
-        if row["kind"] == "ambient":
+        write: str | None
+        if entry := _entry(row):
+            write = None  # a second entry would not count, or lose what the first one says besides
+            why += f"; the number stands in {entry} there"
+        elif row["kind"] == "ambient":
             why += "; full moon gives 0.25 lx"
             write = f"[ambient]\nilluminance = {value:g}"
         elif row["kind"] == "distant":
@@ -167,9 +189,7 @@ def _lights(scene: Scene) -> Iterator[Entry]:
             write = toml_table("light", pattern, ies="FILE", **stated)
         else:
             write = toml_table("light", pattern, candela=value, **_KEPT[row["confidence"]])
-        added = ":lamp[" in (row["rule"] or "")  # the entry that put it there is the place
-        impact = share * _DECADES[row["confidence"]]
-        yield Entry(impact, what, why, PHOTOMETRY, None if added else write)
+        yield Entry(share * _DECADES[row["confidence"]], what, why, PHOTOMETRY, write)
 
 
 def _held(scene: Scene) -> Iterator[Entry]:
@@ -181,7 +201,7 @@ def _held(scene: Scene) -> Iterator[Entry]:
         if not found:
             continue
         count = min(len(found), len(group))
-        share = _share(sum(map(scene.flux, group)), scene.lumens) * count / len(group)
+        share = _share(sum(map(scene.flux, group)), scene.lit) * count / len(group)
         what = f"{group_name(group)}: {count} of {len(group)} inside a mesh that shades it"
         why = f"{_percent(share)} of the scene's light; {found[0]}"
         yield Entry(share, what, why, SOURCE, None)
@@ -189,28 +209,34 @@ def _held(scene: Scene) -> Iterator[Entry]:
 
 def _glowing(scene: Scene) -> Iterator[Entry]:
     for row in scene.materials:
-        if not row["luminance_cd_m2"]:
+        if not row["luminance_cd_m2"] or not row["area_m2"]:  # nobody sees what nothing wears
             continue
         shares = _share(scene.glow(row), scene.lumens), _share(row["area_m2"], scene.area)
         share = max(*shares, _LOOKED_AT)
         value = float(f"{row['luminance_cd_m2']:.4g}")
         what = f"{row['name']}: {value:g} cd/m2 by {row['rule'] or row['provenance']}"
         why = f"it is seen, and dazzles, at this luminance; {_TRUST[row['confidence']]}"
-        write = toml_entry("material", row["name"], luminance=value, **_KEPT[row["confidence"]])
+        write: str | None
+        if entry := _entry(row):
+            write = None
+            why += f"; the number stands in {entry} there"
+        else:
+            write = toml_entry("material", row["name"], luminance=value, **_KEPT[row["confidence"]])
         yield Entry(share * _DECADES[row["confidence"]], what, why, PHOTOMETRY, write)
 
 
 def _units(scene: Scene) -> Iterator[Entry]:
     if scene.unit_stated or scene.area <= 0.0:
         return
-    guessed = any(f["code"] in _UNIT_CODES for f in scene.findings)
+    guesses = (f["code"] for f in scene.findings if f["kind"] != "replaced")
+    guessed = next((_UNITS_TAKEN[code] for code in guesses if code in _UNITS_TAKEN), None)
     called = set(words(scene.name))
     thing = next((size for names, size in _THINGS if called & set(names.split())), None)
     low, high = thing or _SIZES
     plausible = low <= scene.diagonal <= high
     if plausible and not guessed:
         return
-    said = "the source has none, 1 m is taken" if guessed else "as the source has it"
+    said = f"the source has none, {guessed} is taken" if guessed else "as the source has it"
     what = f"unit of length: {said}; all is {scene.diagonal:.3g} m across"
     if not plausible:
         what += f", and {scene.name if thing else 'a scene'} should be {low:g} to {high:g} m"
@@ -259,6 +285,12 @@ def _patterns(scene: Scene) -> Iterator[Entry]:
         if finding["code"] == "sidecar-no-match":
             what = f"pattern {finding['thing']!r} ({finding['place']}): {finding['text']}"
             yield Entry(0.5, what, "what it says is not used", PHOTOMETRY, None)
+
+
+def _entry(row: Row) -> str:
+    """The entry of the photometry file that a number is from, "" where it is from elsewhere."""
+    found = _ENTRY.search(row["rule"] or "")
+    return found[1] if found else ""
 
 
 def _share(part: float, whole: float) -> float:

@@ -48,26 +48,29 @@ def image_rows(
     """
     rows: dict[str, dict[str, Any]] = {}
     total = sum(areas)
-    for material, surface, area in zip(materials, surfaces, areas, strict=True):
+    triples = zip(materials, surfaces, areas, strict=True)
+    for number, (material, surface, area) in enumerate(triples):
         share = area / total if total > 0.0 else 0.0
         for name, texture in _textures(material):
             row = _row(rows, texture.image.name, str(texture.image.source))
             row["uses"].add(_use(name, surface))
             row["missing"] |= texture.image.missing
-            if material.name not in row["materials"]:
-                row["materials"].append(material.name)
+            wearers = row["materials"].setdefault(material.name, set())
+            if number not in wearers:
+                wearers.add(number)
                 row["share"] += share
     for material in materials:
         for key, name in _noted(material.extras):
             if name not in rows:
                 row = _row(rows, name, str(material.source))
                 row["meant"] = _meant(key, name)
-                row["materials"].append(material.name)
+                row["materials"][material.name] = set()
     for file, made in written.items():
         if made.get("image") in rows:
             rows[str(made["image"])]["files"].append(file)
     for row in rows.values():
         uses = row.pop("uses")
+        row["materials"] = list(row["materials"])
         row["class"] = next((c for c in CLASSES if c in uses), "unused")
         row["also"] = [c for c in CLASSES if c in uses and c != row["class"]]
     return list(rows.values())
@@ -80,7 +83,7 @@ def _row(rows: dict[str, dict[str, Any]], name: str, place: str) -> dict[str, An
         "uses": set(),
         "meant": None,
         "missing": False,
-        "materials": [],
+        "materials": {},  # by name, which need not be unique: numbers
         "share": 0.0,
         "files": [],
     }

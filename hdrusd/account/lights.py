@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
 from glob import escape
 from itertools import takewhile
 from typing import Any
@@ -18,6 +19,9 @@ UNITS = {"point": "cd", "spot": "cd", "distant": "lx", "ambient": "lx"}
 
 #: Of a light with a photometric file.
 FACTOR = "times the file"
+
+#: The last of all characters; the digits, each one.
+_LAST, _DIGITS = chr(0x10FFFF), tuple("0123456789")
 
 
 def light_row(
@@ -92,14 +96,27 @@ def group_name(group: Sequence[Mapping[str, Any]]) -> str:
     return first if first == last else f"{first} ... {last}"
 
 
-def group_pattern(group: Sequence[Mapping[str, Any]], others: Iterable[str]) -> str:
-    """The shell pattern of the photometry file that fits a group, and none of ``others``."""
+def group_pattern(group: Sequence[Mapping[str, Any]], everything: Sequence[str]) -> str:
+    """The shell pattern of the photometry file that fits a group and nothing else.
+
+    ``everything``: the names of all lights, sorted. Only the first of the group where names cannot
+    tell it from others.
+    """
     names = sorted({str(row["name"]) for row in group})
     if len(names) == 1:
         return escape(names[0])
     pairs = zip(names[0], names[-1], strict=False)
     same = "".join(a for a, _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
     stem = same.rstrip("0123456789")
-    if stem and not any(name.startswith(stem) for name in others if name not in names):
+    begins = _between(everything, stem, stem + _LAST)
+    if stem and begins == len(group):
         return f"{escape(stem)}*"
+    numbered = all(name[len(stem) : len(stem) + 1] in _DIGITS for name in names)
+    if stem and numbered and _between(everything, stem + "0", stem + ":") == len(group):
+        return f"{escape(stem)}[0-9]*"
     return escape(names[0])
+
+
+def _between(names: Sequence[str], first: str, end: str) -> int:
+    """How many of sorted names stand from ``first`` up to ``end``."""
+    return bisect_left(names, end) - bisect_left(names, first)

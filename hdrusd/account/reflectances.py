@@ -9,7 +9,7 @@ import json
 from collections.abc import Callable, Sequence
 from glob import escape
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -32,8 +32,20 @@ from hdrusd.usd.material import Surface
 
 Array = npt.NDArray[Any]
 
-#: A picture in linear values (h, w, 3) with its alpha (h, w) or None; None where it is missing.
-Picture = Callable[[Image, float], tuple[Array, Array | None] | None]
+#: Of a picture's width and height, rows and columns (n,) of the texels that are wanted.
+Places = Callable[[int, int], tuple[Array, Array]]
+
+
+class Picture(Protocol):
+    """A picture in linear values (h, w, 3) with its alpha (h, w) or None; None where it is missing.
+
+    With ``places`` (1, n) of these alone.
+    """
+
+    def __call__(
+        self, image: Image, gamma: float, places: Places | None = None
+    ) -> tuple[Array, Array | None] | None: ...
+
 
 #: A highlight from which on a surface may be black without it.
 _MIRRORS = 0.04
@@ -86,19 +98,25 @@ class Reflectances:
             flat = np.broadcast_to(diffuse, (1 if color is None else len(color), 3))
             values = flat if color is None else flat * color
             return reflectance(values, np.ones(len(values)))
-        made = self.picture(texture.image, surface.gamma) if surface.diffuse_map else None
-        if made is None:  # what is missing is a finding of its own
+        if not surface.diffuse_map:  # what is missing is a finding of its own
+            return None
+        uv, shown = found.uv, np.ones(1)
+
+        def places(width: int, height: int) -> tuple[Array, Array]:
+            nonlocal shown
+            assert uv is not None
+            row, column, shown = texels(texture, uv, width, height)
+            return row, column
+
+        made = self.picture(texture.image, surface.gamma, None if uv is None else places)
+        if made is None:
             return None
         pixels, alpha = made
-        if found.uv is None:
-            values, weights = pixels.reshape(-1, 3), np.ones(pixels.shape[0] * pixels.shape[1])
-            seen = None if alpha is None else alpha.ravel()
-        else:
-            row, column, inside = texels(texture, found.uv, pixels.shape[1], pixels.shape[0])
-            values = pixels[row, column] * inside[:, None]
+        values, weights = pixels.reshape(-1, 3), np.ones(pixels.shape[0] * pixels.shape[1])
+        seen = None if alpha is None else alpha.ravel()
+        if uv is not None:
+            values = values * shown[:, None]
             values = values if color is None else values * color
-            weights = np.ones(len(row))
-            seen = None if alpha is None else alpha[row, column]
         if seen is not None and material.alpha_mode != "opaque":
             weights = seen if material.alpha_mode == "blend" else seen > material.alpha_cutoff
         return reflectance(values * diffuse, weights.astype(np.float64))
@@ -178,9 +196,10 @@ def toml_entry(section: str, name: str, **values: Any) -> str:
 
 def toml_table(section: str, pattern: str, **values: Any) -> str:
     """An entry of the photometry file; JSON's strings, lists and numbers are TOML's too."""
-    lines = [f"[[{section}]]", f"match = {json.dumps(pattern, ensure_ascii=False)}"]
-    lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in values.items()]
-    return "\n".join(lines)
+    pairs = {"match": pattern} | values
+    lines = [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in pairs.items()]
+    # The one character that JSON lets stand and TOML does not.
+    return "\n".join([f"[[{section}]]", *lines]).replace("\x7f", "\\u007f")
 
 
 def _metallic(material: Material) -> float:

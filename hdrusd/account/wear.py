@@ -6,7 +6,7 @@ one surface, and a tile that repeats shows all of it many times.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,12 +44,25 @@ class _Part:
     scale: float  # m2 of all copies together a square unit of the mesh
 
 
-def worn(scene: LegacyScene, scales: Mapping[int, float], material: int) -> Worn:
-    """How a material is worn. ``scales``: m2 a square unit of each mesh, summed over its copies."""
+def wearers(scene: LegacyScene) -> dict[int | None, list[int]]:
+    """The meshes that have each material."""
+    found: dict[int | None, list[int]] = {}
+    for index, mesh in enumerate(scene.meshes):
+        for material in {mesh.material, *(subset.material for subset in mesh.subsets)}:
+            found.setdefault(material, []).append(index)
+    return found
+
+
+def worn(
+    scene: LegacyScene, scales: Mapping[int, float], material: int, meshes: Sequence[int]
+) -> Worn:
+    """How a material is worn. ``scales``: m2 a square unit of each mesh, summed over its copies;
+    ``meshes``: those that have it (``wearers``).
+    """
     parts = [
-        _Part(mesh, faces, scales.get(index, 0.0))
-        for index, mesh in enumerate(scene.meshes)
-        if (faces := _faces(mesh, material)).any()
+        _Part(scene.meshes[index], faces, scales.get(index, 0.0))
+        for index in meshes
+        if (faces := _faces(scene.meshes[index], material)).any()
     ]
     shown = [part for part in parts if part.scale > 0.0]
     count = sum(int(part.faces.sum()) for part in parts)
@@ -100,6 +113,8 @@ def _at_corners(triangles: Corners, values: Array, interpolation: str) -> Array 
 
 def _places(pieces: list[_Piece], area: float) -> tuple[Array | None, Array | None]:
     """Values at places that lie as densely everywhere."""
+    if all(piece.uv is None and piece.color is None for piece in pieces):
+        return None, None
     areas = np.concatenate([piece.areas for piece in pieces])
     reached = np.cumsum(areas)
     ladder = (np.arange(PLACES) + 0.5) * (reached[-1] / PLACES)

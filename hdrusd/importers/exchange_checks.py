@@ -29,7 +29,9 @@ def check_scene(scene: LegacyScene, limits: Limits) -> None:
         node = stack.pop()
         stack.extend(node.children)
         _check_node(node, scene)
+    _want(scene.unit_m > 0.0, "the unit of a scene")
     for light in scene.lights:
+        _want(light.lamps > 0, "the places of a light")
         count = None if light.positions is None else len(light.positions)
         for array in (light.positions, light.directions):
             _want(array is None or _is(array, count, 3), "the places of a light")

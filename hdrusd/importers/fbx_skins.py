@@ -14,6 +14,7 @@ import numpy.typing as npt
 from hdrusd.importers.fbx_document import Document
 from hdrusd.importers.fbx_held import Held
 from hdrusd.legacy.scene import Floats, Ints, Node, Skin
+from hdrusd.legacy.skinning import influences
 from hdrusd.report import Kind
 
 #: Bones that hold one point, at most; the strongest are kept.
@@ -61,15 +62,20 @@ class Weights:
         return good
 
     def of(self, mesh: Held, points: int) -> tuple[Ints | None, Floats | None]:
-        """Joints and weights of each point, (points, k), sums of 1; None for no skin."""
+        """Joints and weights of each point, (points, k), sums of 1; None for no skin.
+
+        A weight of 0 in all would take a point to the origin.
+        """
         clusters = self.clusters(mesh)
         if not clusters:
             return None, None
         held = [c.vertices.integers() for c in clusters]
-        strength = [np.nan_to_num(c.weights.rows(1), posinf=0.0, neginf=0.0) for c in clusters]
+        strength = [c.weights.rows(1) for c in clusters]
         joint = np.repeat(np.arange(len(clusters)), [len(h) for h in held])
         point, weight = np.concatenate(held), np.concatenate(strength)
-        good = (point >= 0) & (point < points) & (weight > 0.0)
+        good = (point >= 0) & (point < points) & (weight >= 0.0) & (weight < np.inf)
+        broken = int((~good).sum())
+        good &= weight > 0.0
         joint, point, weight = joint[good], point[good], weight[good]
         order = np.lexsort((-weight, point))
         joint, point, weight = joint[order], point[order], weight[order]
@@ -86,8 +92,13 @@ class Weights:
         weights = np.zeros((points, width), np.float64)
         joints[rows, columns] = joint[strongest]
         weights[rows, columns] = weight[strongest]
-        total = weights.sum(axis=1, keepdims=True)
-        return joints, np.divide(weights, total, where=total > 0.0, out=weights).astype(np.float32)
+        found = influences(joints, weights, len(clusters))
+        if broken or found.free:
+            text = f"{broken} influences on points that are not there, negative or not finite; "
+            text += f"{found.free} of {points} points without any are on joint 0"
+            place = self.document.ref("mesh", mesh.name)
+            self.document.note(Kind.INVALID, "skin-weights", place, mesh.name, text)
+        return found.indices, found.weights
 
 
 def read_skin(

@@ -152,6 +152,7 @@ IMPORTERS.add("3ds", "hdrusd.importers.tds:read")
 IMPORTERS.add("gltf", "hdrusd.importers.gltf:read")
 IMPORTERS.add("obj", "hdrusd.importers.obj:read")
 IMPORTERS.add("osg", "hdrusd.importers.osg:read")
+IMPORTERS.add("osgb", "hdrusd.importers.osgb:read")
 IMPORTERS.add("assimp", "hdrusd.importers.assimp:read")
 IMPORTERS.add("osgconv", "hdrusd.importers.osgconv:read")
 
@@ -168,7 +169,7 @@ SUFFIXES = {
     ".obj": "obj",
     ".osg": "osg",
     ".osgt": "osg",
-    ".osgb": "osgconv",
+    ".osgb": "osgb",
     ".ive": "osgconv",
     ".ac": "assimp",
     ".b3d": "assimp",

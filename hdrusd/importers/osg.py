@@ -96,7 +96,7 @@ class _SceneReader:
         check_expansion(self.scene.roots, self.limits)
         self.lights.finish()
         if not self.known:
-            raise InputError(source, "no node of a known class; want OpenSceneGraph text")
+            raise InputError(source, "no node of a known class; want an OpenSceneGraph scene")
         return self.scene
 
     def _visit(self, visit: _Visit) -> None:

@@ -105,7 +105,7 @@ class _Objects(Bytes):
             if len(stack) > self.limits.depth:
                 raise self._error(f"objects deeper than {self.limits.depth}")
         if isinstance(problem, DamagedError):
-            raise self._error(str(problem))
+            raise self._error(f"{problem}; want a whole, undamaged file")
         if problem is not None:
             raise problem
 
@@ -131,7 +131,8 @@ class _Objects(Bytes):
             inner.statements.append(Statement(["UniqueID", number], start))
             self.at = end if self.layout.sizes else self.at
             return
-        if self.layout.sizes and self.at == end:  # inside something that was passed over
+        fields = self._plan(label)
+        if self.layout.sizes and self.at == end and fields != ():  # in a part that was passed over
             text = f"object {number} was in a part that is not known"
             self.document.add(Kind.MISSING, "osg-reference", statement, label, text)
             return
@@ -141,7 +142,9 @@ class _Objects(Bytes):
             raise self._error(f"more than {_OBJECTS_PER_NODE * self.limits.nodes} objects")
         outer, self.end = self.end, end
         try:
-            yield from self._fields(label, inner)
+            if fields is None:
+                raise UnknownPartError(self.at, f"{label} is no class that is known here")
+            yield from self._fields(fields, inner, label)
         except (UnknownPartError, DamagedError) as problem:
             if not self.layout.sizes:
                 raise
@@ -152,13 +155,14 @@ class _Objects(Bytes):
         if self.layout.sizes:
             self.at = end
 
-    def _fields(self, label: str, block: Block) -> Reader:
-        """Read the fields of a class."""
+    def _plan(self, label: str) -> tuple[Field, ...] | None:
+        """The fields of a class; None if it is not known."""
         if label not in self._plans:
             self._plans[label] = plan(label, self.layout.version, self.layout.schema)
-        fields = self._plans[label]
-        if fields is None:
-            raise UnknownPartError(self.at, f"{label} is no class that is known here")
+        return self._plans[label]
+
+    def _fields(self, fields: tuple[Field, ...], block: Block, label: str) -> Reader:
+        """Read the fields of a class into a block."""
         statements = block.statements
         data, passed = self.data, 0
         for name, optional, layout, absent, skipped in fields:
@@ -196,9 +200,7 @@ class _Objects(Bytes):
                 statements.append(line)
                 yield from self._layout(layout, line, block)
 
-    def _vector(
-        self, name: str, items: tuple[Element, ...], statements: list[Statement]
-    ) -> Reader:
+    def _vector(self, name: str, items: tuple[Element, ...], statements: list[Statement]) -> Reader:
         place, count = self.at, self.number()
         if count:
             line = Statement([name, str(count)], place)
@@ -416,7 +418,7 @@ class _Objects(Bytes):
         if how == _INLINE_DATA:
             self.advance(4 * self.number())  # where the smaller levels begin
         # what an image has beyond that is written by the program, whatever its class
-        yield from self._fields("osg::Object", inner)
+        yield from self._fields(self._plan("osg::Object") or (), inner, "osg::Object")
 
 
 _SPECIAL: dict[str, Callable[[_Objects, Statement], Reader]] = {

@@ -1,7 +1,8 @@
 """The classes of OpenSceneGraph's library osg, as a binary file has them.
 
 How a line reads: ``osg_layouts``. Names, types and versions are those of the serializers of
-OpenSceneGraph 3.6.5 (file version 161), src/osgWrappers/serializers/osg.
+OpenSceneGraph 3.6.5 (file version 161), src/osgWrappers/serializers/osg. Callbacks without bases
+have no serializers there: nothing follows their number.
 """
 
 CLASSES = """
@@ -94,6 +95,9 @@ Drawable(Object Node@154-) StateSet@-155:O InitialBound:?{Minimum:3d,Maximum:3d}
   ComputeBoundingBoxCallback:O Shape:O SupportsDisplayList:-b UseDisplayList:-b
   UseVertexBufferObjects:-b UpdateCallback@-155:O EventCallback@-155:O CullCallback@-155:O
   DrawCallback@-155:O NodeMask@142-:I CullingActive@145-:-b
+DrawableCullCallback()
+DrawableEventCallback()
+DrawableUpdateCallback()
 ElementBufferObject(Object BufferObject)
 EllipsoidModel(Object) RadiusEquator:d RadiusPolar:d
 FloatArray(Object BufferData@147- Array) vector:[f]
@@ -204,6 +208,7 @@ ShortArray(Object BufferData@147- Array) vector:[h]
 ShortValueObject(Object) Value:h
 Sphere(Object Shape) Center:3f Radius:f
 StateAttribute(Object) UpdateCallback:O EventCallback:O
+StateAttributeCallback()
 StateSet(Object) ModeList:?N{g,v} AttributeList:?N{o,Value:v} TextureModeList:?n{=Data,N{g,v}}
   TextureAttributeList:?n{=Data,N{o,Value:v}} UniformList:?n{o,Value:v} RenderingHint:i
   RenderBinMode:-i BinNumber:-i BinName:s NestRenderBins:-b UpdateCallback:O EventCallback:O

@@ -54,7 +54,7 @@ class GeometryReader:
         indices = vertices.indices
         polygons = self.primitives.read(geometry, len(points) if indices is None else len(indices))
         corners = polygons.elements if indices is None else indices[polygons.elements]
-        finite = np.isfinite(points).all(axis=1)
+        finite = np.logical_and.reduce(np.isfinite(points), axis=1)
         good = (corners >= 0) & (corners < len(points))
         if not finite.all():
             good[good] = finite[corners[good]]
@@ -94,8 +94,9 @@ class GeometryReader:
             found = reader.read(f"texture coordinates {unit}", coordinates, 2)
             if found is not None:
                 uvs[uv_set(unit)] = found
-        for key in ("secondarycolorarray", "fogcoordarray", "vertexattribarraylist"):
-            other = self.document.field(geometry, key)
+        for stem in ("secondarycolor", "fogcoord", "vertexattrib"):
+            keys = f"{stem}array", f"{stem}arraylist", f"{stem}data"
+            other = self.document.field(geometry, *keys)
             if other is not None:
                 text = f"{other.words[0]}: dropped"
                 self.document.add(Kind.DROPPED, "osg-vertex-attribute", other, mesh.name, text)

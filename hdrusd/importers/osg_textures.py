@@ -118,8 +118,7 @@ class TextureReader:
         holder = document.field(texture, "image", "imagesequence")
         holder = None if holder is None else document.resolve(holder)
         if holder is None or holder.block is None:
-            text = "no image; the texture is left out"
-            document.add(Kind.MISSING, "osg-image", texture, document.name(texture), text)
+            self._imageless(texture)
             return None
         name = document.word(holder, "filename") or ""
         if "ImageSequence" in (document.word(holder, "classname") or holder.label):
@@ -141,7 +140,14 @@ class TextureReader:
                 else:
                     self._images[key] = self._inline(name, holder)
             return self._images[key]
+        if not name:
+            self._imageless(texture)
+            return None
         return self._file(name, holder)
+
+    def _imageless(self, texture: Statement) -> None:
+        text = "no image; the texture is left out"
+        self.document.add(Kind.MISSING, "osg-image", texture, self.document.name(texture), text)
 
     def _file(self, name: str, place: Statement) -> Image:
         if name not in self._images:

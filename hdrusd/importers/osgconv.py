@@ -1,4 +1,4 @@
-"""Reader for OpenSceneGraph's binary files, ``.osgb`` and ``.ive``, by its program osgconv.
+"""Reader for OpenSceneGraph's ``.ive``, and for some ``.osgb``, by its program osgconv.
 
 osgconv runs as a worker in a private folder with a copy of the file and writes ``.osgt`` there,
 which our reader of OpenSceneGraph text takes in the place of the file. Pictures that stand in

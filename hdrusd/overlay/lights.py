@@ -19,7 +19,7 @@ from hdrusd.photometry.light import PhotometricLight
 from hdrusd.photometry.light_unit import CONSTANTS, LIGHT_UNITS
 from hdrusd.photometry.sidecar import Rule, Sidecar
 from hdrusd.report import Kind, Report
-from hdrusd.skies import Sky, SkyFiles
+from hdrusd.skies import SkyFiles, even_sky
 from hdrusd.usd import ambient, light, light_overs
 from hdrusd.usd.light_overs import (
     NO_SHAPING,
@@ -109,6 +109,9 @@ class LightOverlay:
         if not source.alike and not meaning.profile:
             text = "copies of different size; their candela stay with the nits"
             self._note(prim, Kind.ASSUMED, "usd-light-copies", text)
+        if source.resampled:
+            text = "varies on no straight line between its time samples; read at every time code"
+            self._note(prim, Kind.REPLACED, "usd-light-resampled", text)
         write_light_over(self.overs, source, meaning, radius=radius)
         self._account(source, meaning, file, places)
 
@@ -122,7 +125,7 @@ class LightOverlay:
             self.report.add(Kind.DROPPED, "usd-rule-unused", rule.place, "ambient", text)
             return
         color = rule_color(rule, temperature_rgb)
-        made = self.skies.make(rule, color) if "preset" in rule.values else _plain_sky(rule, color)
+        made = self.skies.make(rule, color) if "preset" in rule.values else even_sky(rule, color)
         if made is None:
             return
         # The layer alone, so that what is written does not change the stage that is read.
@@ -313,17 +316,3 @@ class LightOverlay:
 
     def _note(self, prim: Usd.Prim, kind: Kind, code: str, text: str) -> None:
         self.report.add(kind, code, SourceRef(self.file), str(prim.GetPath()), text)
-
-
-def _plain_sky(rule: Rule, color: legacy.RGB | None) -> Sky:
-    """Light from everywhere alike."""
-    return Sky(
-        PhotometricLight(
-            "ambient",
-            rule.number("illuminance") or 0.0,
-            color or (1.0, 1.0, 1.0),
-            provenance=rule.provenance,
-            rule=str(rule.place),
-            source=rule.source,
-        )
-    )

@@ -29,6 +29,7 @@ from hdrusd.photometry.sidecar import Sidecar
 from hdrusd.report import Kind, Report
 from hdrusd.skies import SkyFiles
 from hdrusd.usd.authorship import authorship_inputs, write_authorship
+from hdrusd.usd.layer_files import new_layer, save_layer
 from hdrusd.usd.light_overs import light_places
 from hdrusd.usd.opening import usd_warnings
 from hdrusd.usd.overs import Overs, all_prims, population, relative
@@ -45,6 +46,9 @@ from hdrusd.validation import validate
 
 #: Variants that are selected in turn, outer ones first.
 _Choices = tuple[Choice, ...]
+
+#: Instances in one another: each is met below the one above it.
+_MOST_NESTED = 64
 
 #: So many of them, so that each has its photometry.
 _MOST_VARIANTS = 256
@@ -78,13 +82,16 @@ class Overlay:
                 self.stage.GetRootLayer().pseudoRoot.SetInfo(key, value)
         self.unit_stated = source_layer(self.stage).pseudoRoot.HasInfo("metersPerUnit")
         self._check_output()
-        count = population(self.stage)
+        count, nested = population(self.stage)
+        if nested > _MOST_NESTED:
+            text = f"{nested} instances in one another; want at most {_MOST_NESTED}"
+            raise InputError(source, text)
         if count > options.limits.nodes:
             text = f"{count} prims with all instances; want at most {options.limits.nodes}"
             raise InputError(source, text)
         stem = output.stem
         files = folder / f"{stem}.textures", f"./{stem}.textures"
-        self.layer = Sdf.Layer.CreateNew(str(folder / f"{stem}.photometry.usda"))
+        self.layer = new_layer(folder / f"{stem}.photometry.usda")
         copy_time_metadata(source_layer(self.stage), self.layer)
         self.overs = Overs(self.stage, self.layer)
         interpreter = Interpreter(
@@ -110,8 +117,9 @@ class Overlay:
     def _run(self) -> Result:
         counts = self._counts()
         self._note_unused()
-        self._convert(None)
-        self._convert_other_variants()
+        with self.maps.threaded(()):  # maps are written behind
+            self._convert(None)
+            self._convert_other_variants()
         if not any(counts.values()) and not self.layer.rootPrims:  # in no variant either
             raise InputError(self.source, "nothing in it that a stage could show")
         self.lights.write_sky()
@@ -258,13 +266,12 @@ class Overlay:
         if default and self.layer.rootPrims:
             inputs = authorship_inputs(self.source, self.sidecar.path)
             write_authorship(self.layer, default.GetPath(), inputs, default)
-        root = Sdf.Layer.CreateNew(str(self.folder / self.output.name))
+        root = new_layer(self.folder / self.output.name)
         copy_stage_metadata(self.stage.GetRootLayer(), root)
         way = os.path.relpath(self.source.resolve(), self.output.parent.resolve())
         root.subLayerPaths[:] = [f"./{self.output.stem}.photometry.usda", relative(Path(way))]
         for layer in (self.layer, root):
-            if not layer.Save(force=True):
-                raise OSError(f"{layer.identifier}: cannot be written")
+            save_layer(layer)
 
     def _validate(self) -> None:
         """The stage as it is now; what its source has wrong itself is no reason to refuse it."""

@@ -18,6 +18,9 @@ from hdrusd.units import LUMINANCE_WEIGHTS
 
 Array = npt.NDArray[Any]
 
+#: Texels a side of a picture that is looked at; of a larger one every k-th.
+OVERVIEW = 2048
+
 #: Blocks along each side, on which shadows are looked for; smaller pictures say too little.
 _BLOCKS = 64
 _LEAST = 32

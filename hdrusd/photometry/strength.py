@@ -80,7 +80,10 @@ def _by_watts(rule: Rule, beam: Beam, note: Note) -> Stated | None:
         f"{lamp.least:g} to {lamp.most:g} are usual ({lamp.source}); efficacy says otherwise"
     )
     note(Kind.ASSUMED, "lamp-efficacy", text)
-    name = f"{BY_LAMP_TYPE}{lamp.name}, {rule.place}, {watts:g} W at {typical:g} lm/W, {how}"
+    how = f"{watts:g} W at {typical:g} lm/W, {how}"
+    name = f"{BY_LAMP_TYPE}{lamp.name}, {rule.place}, {how}"
+    if rule.provenance == "estimated":  # guessed watts are worth a guess
+        name = f"{rule.place}, {BY_LAMP_TYPE}{lamp.name}, {how}"
     source = "; ".join(text for text in (rule.source, lamp.source) if text)
     return Stated(value, "estimated", name, source)
 

@@ -368,16 +368,20 @@ def _shines(place: Place) -> bool:
 
 
 def _spots(scene: LegacyScene, picture: Picture, glowing: set[int]) -> list[Lead]:
-    """Textures with small full spots in a wide glow."""
+    """Textures with small full spots in a wide glow; each is looked at once."""
     found = []
+    counts: dict[object, int] = {}
     for index, material in enumerate(scene.materials):
         if index in glowing or material.diffuse_map is None:
             continue
-        pixels = picture(material.diffuse_map.image)
-        count = 0 if pixels is None else baked_lamps(pixels)
+        image = material.diffuse_map.image
+        key = image.path or id(image)
+        if key not in counts:
+            pixels = picture(image)
+            counts[key] = 0 if pixels is None else baked_lamps(pixels)
+        count = counts[key]
         if count:
-            name = material.diffuse_map.image.name
-            reason = f"{count} full texels in a wide glow in {name}"
+            reason = f"{count} full texels in a wide glow in {image.name}"
             found.append(Lead("material", escape(material.name), "spots", reason, None, False))
     return _once(found)
 

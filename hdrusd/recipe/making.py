@@ -14,6 +14,7 @@ from hdrusd.errors import InputError
 from hdrusd.images import read_image, write_atomically
 from hdrusd.importers.importer import Resolver, read
 from hdrusd.legacy.scene import Image
+from hdrusd.photometry.baked import OVERVIEW
 from hdrusd.photometry.reflectance import reflectance_table
 from hdrusd.recipe.evidence import leads
 from hdrusd.recipe.places import Doubles
@@ -59,7 +60,9 @@ def _write(path: Path, text: str) -> None:
 
 
 def _picture(image: Image) -> Doubles | None:
-    """8-bit pictures in linear values; others hold no painted lamps."""
+    """8-bit pictures in linear values, as ``MapWriter.overview`` has them; others hold no painted
+    lamps.
+    """
     if image.missing:
         return None
     pixels: npt.NDArray[Any] | None = image.pixels
@@ -70,5 +73,7 @@ def _picture(image: Image) -> Doubles | None:
             return None
     if pixels.dtype != "uint8":
         return None
+    step = -(-max(pixels.shape[:2]) // OVERVIEW)
+    pixels = pixels[::step, ::step]
     color = pixels[..., :3] if pixels.shape[2] >= 3 else pixels[..., :1].repeat(3, axis=2)
     return np.asarray(reflectance_table(TEXTURE_GAMMA, 1.0)[color])

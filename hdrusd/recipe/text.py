@@ -48,6 +48,7 @@ def _entry(lead: Lead) -> str:
         rows.append(f"offset = {list(lead.offset)}  # {lead.where}")
     if kind is None and not lead.twin:
         key = "luminance" if lead.section == "material" else "candela"
+        key = "illuminance" if lead.found == "directional light" else key
         rows.append(f"{key} = 0  # want a number")
         if lead.section == "material" and not lead.certain:
             rows.append("hdr_texture = true  # it shines as its picture does")

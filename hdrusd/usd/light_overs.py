@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
 from hdrusd.photometry.light import RGB, PhotometricLight, chromaticity
@@ -38,6 +39,9 @@ _SIZES = ("normalize", "radius", "width", "height", "length", "angle")
 #: Copies of a light whose candela differ by more than this, relative, have no number in common.
 _ALIKE = 1e-6
 
+#: Moments of a light that is read between its time samples, at most.
+_MOST_MOMENTS = 10_000
+
 _TYPES = Sdf.ValueTypeNames
 
 
@@ -55,7 +59,8 @@ class SourceLight:
     """A light of a source stage as UsdLux 25.05 reads it.
 
     ``moments``: by time code, of each time sample; by None where nothing varies. ``radius``: m.
-    ``alike``: whether all its copies have the same candela.
+    ``alike``: whether all its copies have the same candela. ``resampled``: whether there are
+    moments between the time samples, as its strength or its hue is on no straight line there.
     """
 
     prim: Usd.Prim
@@ -63,6 +68,7 @@ class SourceLight:
     moments: Mapping[float | None, Moment]
     radius: float
     alike: bool
+    resampled: bool = False
 
     @property
     def brightest(self) -> Moment:
@@ -120,8 +126,7 @@ def read_source_light(prim: Usd.Prim, places: Iterable[Usd.Prim]) -> SourceLight
         UsdGeom.Xformable(p).ComputeLocalToWorldTransform(Usd.TimeCode.EarliestTime())
         for p in places
     ]
-    sources = [input_source(prim, name) for name in (*_STRENGTH, *_SIZES)]
-    times = sorted({t for source in sources if source for t in source.GetTimeSamples()})
+    times, resampled = _times(prim)
     unit = UsdGeom.GetStageMetersPerUnit(prim.GetStage())
     moments: dict[float | None, Moment] = {}
     radius = 0.0
@@ -138,7 +143,27 @@ def read_source_light(prim: Usd.Prim, places: Iterable[Usd.Prim]) -> SourceLight
     normalize = normalized(prim, code)
     factors = [strength_per_nit(prim, code, normalize, world, unit)[0] for world in worlds]
     alike = max(factors) - min(factors) <= _ALIKE * max(factors) and not _in_instancer(prim)
-    return SourceLight(prim, kind, moments, radius, alike)
+    return SourceLight(prim, kind, moments, radius, alike, resampled)
+
+
+def _times(prim: Usd.Prim) -> tuple[list[float], bool]:
+    """The times that a light is read at, and whether some are between its time samples.
+
+    Numbers over the source's are joined by straight lines. The source is on these where its
+    intensity alone varies; else it is read at every time code, too.
+    """
+    named = ((name, input_source(prim, name)) for name in (*_STRENGTH, *_SIZES))
+    samples = {name: source.GetTimeSamples() for name, source in named if source}
+    times = sorted({time for found in samples.values() for time in found})
+    curved = any(len(found) > 1 for name, found in samples.items() if name != "intensity")
+    held = prim.GetStage().GetInterpolationType() == Usd.InterpolationTypeHeld
+    if held or not curved:
+        return times, False
+    low, high = math.ceil(times[0]), math.floor(times[-1])
+    count = min(high - low + 1, _MOST_MOMENTS)
+    between = np.linspace(low, high, count).tolist() if count > 0 else []
+    every = sorted({*times, *between})
+    return every, len(every) > len(times)
 
 
 def write_light_over(

@@ -54,11 +54,26 @@ class Surface:
 def write_look(
     stage: Usd.Stage, path: Sdf.Path, material: Material, maps: dict[str, Map], vertex_color: str
 ) -> None:
-    """The legacy look as UsdPreviewSurface; ``maps`` by "diffuse", "emission", "opacity"."""
+    """The legacy look as UsdPreviewSurface; ``maps`` by "diffuse", "emission", "opacity".
+
+    A picture without a map is missing, refused or broken: the reference stays in the extras.
+    """
     network = _Network(stage, path, "Look")
     network.color("diffuseColor", material.diffuse, maps.get("diffuse"), vertex_color)
     network.color("emissiveColor", _shown(material), maps.get("emission"), "")
-    keep_extras(network.material.GetPrim(), material.extras)
+    prim = network.material.GetPrim()
+    display_name(prim, material.name)
+    textures = {
+        "diffuse": material.diffuse_map,
+        "emission": material.emission_map,
+        "opacity": material.opacity_map,
+    }
+    lost = {
+        f"{role}_map": texture.image.name
+        for role, texture in textures.items()
+        if texture is not None and role not in maps
+    }
+    keep_extras(prim, {**material.extras, **lost})
     _write_common(network, material, material.specular, maps.get("opacity"))
 
 
@@ -223,6 +238,12 @@ class _Network:
 
 def _set(prim: Usd.Prim, name: str, kind: Sdf.ValueTypeName, value: object) -> None:
     prim.CreateAttribute(name, kind, False, Sdf.VariabilityUniform).Set(value)
+
+
+def display_name(prim: Usd.Prim, name: str) -> None:
+    """Keep a source's name where the prim's differs."""
+    if name and prim.GetName() != name:
+        prim.SetDisplayName(name[:200])
 
 
 def keep_extras(prim: Usd.Prim, extras: Mapping[str, Any]) -> None:

@@ -189,21 +189,28 @@ def all_prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
         yield from (prim for prim in Usd.PrimRange(prototype) if prim != prototype)
 
 
-def population(stage: Usd.Stage) -> int:
-    """How many prims there are with all that instances show, counted without going there."""
-    known: dict[Sdf.Path, int] = {}
+def population(stage: Usd.Stage) -> tuple[int, int]:
+    """How many prims there are with all that instances show, counted without going there.
 
-    def size(root: Usd.Prim) -> int:
-        path = root.GetPath()
-        if path not in known:
-            known[path] = 0
-            known[path] = sum(
-                1 + (size(prim.GetPrototype()) if prim.IsInstance() else 0)
-                for prim in Usd.PrimRange(root)
-            )
-        return known[path]
-
-    return size(stage.GetPseudoRoot())
+    And how many instances stand in one another, at most.
+    """
+    known: dict[Sdf.Path, tuple[int, int]] = {}
+    inside: dict[Sdf.Path, tuple[int, list[Usd.Prim]]] = {}  # prims, and prototypes of instances
+    stack = [stage.GetPseudoRoot()]
+    while stack:
+        path = stack[-1].GetPath()
+        if path not in inside:
+            prims = list(Usd.PrimRange(stack[-1]))
+            shown = [prim.GetPrototype() for prim in prims if prim.IsInstance()]
+            inside[path] = len(prims), shown
+            stack += [prim for prim in shown if prim.GetPath() not in inside]
+            continue
+        stack.pop()
+        own, shown = inside[path]
+        below = [known.get(prim.GetPath(), (0, 0)) for prim in shown]
+        depth = 1 + max(deep for _, deep in below) if below else 0
+        known[path] = own + sum(count for count, _ in below), depth
+    return known[stage.GetPseudoRoot().GetPath()]
 
 
 def _chain(prim: Usd.Prim) -> list[Usd.Prim]:

@@ -20,7 +20,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from hdrusd.legacy.scene import LegacyScene, Mesh, Node, Skin
 from hdrusd.report import Kind, Report
-from hdrusd.usd.names import unique
+from hdrusd.usd.names import Taken, unique
 from hdrusd.usd.transform import first_matrix, matrices, pose, samples
 
 #: Times at which the box of a skinned mesh is looked at.
@@ -47,9 +47,9 @@ class Bones:
     tokens: list[str] = field(default_factory=list)
     bound: list[int] = field(default_factory=list)  # of each joint of the skin, its number here
 
-    def add(self, node: Node, parent: int, taken: dict[int, set[str]]) -> int:
+    def add(self, node: Node, parent: int, taken: dict[int, Taken]) -> int:
         """One more joint; its number."""
-        name = unique(node.name, taken.setdefault(parent, set()))
+        name = unique(node.name, taken.setdefault(parent, {}))
         self.nodes.append(node)
         self.parents.append(parent)
         self.tokens.append(name if parent < 0 else f"{self.tokens[parent]}/{name}")
@@ -103,7 +103,7 @@ class Skeletons:
         if not _invertible(place):
             self._stays(node, "its node has no volume")
             return
-        taken: dict[int, set[str]] = {}
+        taken: dict[int, Taken] = {}
         numbers: dict[int, int] = {}
         seen: set[int] = set()
         for line in lines:

@@ -1,16 +1,21 @@
 """A stage as the source of a conversion: opened below its roots, laid under an overlay.
 
 USD opens whatever a layer names, wherever it lies. A conversion reads only below the
-declared roots, so the layers outside are muted before the stage is composed.
+declared roots, so the layers outside are muted before the stage is composed. Muting alone
+does not keep USD from opening them (a muted sublayer is opened as the stage learns of it, value
+clips cannot be muted, validators compose anew): an empty layer in memory has the place of each
+as long as the stage lives.
 """
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+import weakref
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
-from pxr import Ar, Sdf, Tf, Usd, UsdGeom
+from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdUtils
 
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.report import Kind, Report
@@ -32,8 +37,8 @@ _PACKAGE = "["
 def open_source(path: Path, allowed: Callable[[Path], bool], report: Report) -> Usd.Stage:
     """The stage at ``path``, as a sublayer of an anonymous one; edits of it touch no file.
 
-    ``allowed``: whether a file lies below the roots; layers elsewhere are muted, with a
-    finding each. Raises InputError where ``path`` is no layer.
+    ``allowed``: whether a file lies below the roots; layers elsewhere are muted and not opened,
+    with a finding each. Raises InputError where ``path`` is no layer.
     """
     with usd_warnings(path, report):
         layer = _opened(path)
@@ -41,9 +46,11 @@ def open_source(path: Path, allowed: Callable[[Path], bool], report: Report) -> 
         copy_stage_metadata(layer, root)
         stage = Usd.Stage.Open(root, Sdf.Layer.CreateAnonymous("source-session.usda"))
         refused = _outside(layer, allowed)
+        stand_ins = [_stand_in(path, identifier) for identifier in refused]
+        weakref.finalize(stage, stand_ins.clear)
         stage.MuteAndUnmuteLayers(refused, [])
         root.subLayerPaths.append(layer.identifier)
-        # What an expression names is known only when it is composed.
+        # An expression may name something else where it is composed than where it stands.
         late = [x.identifier for x in stage.GetUsedLayers() if not _inside(x, allowed)]
         stage.MuteAndUnmuteLayers(late, [])
     for identifier in (*refused, *sorted(late)):
@@ -94,15 +101,18 @@ def _inside(layer: Sdf.Layer, allowed: Callable[[Path], bool]) -> bool:
 def _outside(layer: Sdf.Layer, allowed: Callable[[Path], bool]) -> list[str]:
     """Identifiers of existing layers outside the roots that the layers inside name."""
     refused: list[str] = []
-    known, pending = {layer.identifier}, [layer]
+    known = {layer.identifier}
+    pending: list[tuple[Sdf.Layer, Mapping[str, Any]]] = [(layer, {})]
     while pending:
-        above = pending.pop()
-        for asset in sorted(above.GetCompositionAssetDependencies()):
-            identifier = Sdf.ComputeAssetPathRelativeToLayer(above, asset) if asset else ""
+        above, stated = pending.pop()
+        variables = {**above.expressionVariables, **stated}
+        for asset in _named_layers(above, variables):
+            identifier = Sdf.ComputeAssetPathRelativeToLayer(above, asset)
             if not identifier or identifier in known:
                 continue
             known.add(identifier)
-            resolved = str(Ar.GetResolver().Resolve(identifier))
+            location, _ = Sdf.Layer.SplitIdentifier(identifier)  # arguments for its format
+            resolved = str(Ar.GetResolver().Resolve(location))
             if not resolved:
                 continue  # USD says so
             if not allowed(_file(resolved)):
@@ -111,8 +121,37 @@ def _outside(layer: Sdf.Layer, allowed: Callable[[Path], bool]) -> list[str]:
             with contextlib.suppress(Tf.ErrorException):  # USD says so where it is used
                 found = Sdf.Layer.FindOrOpen(identifier)
                 if found is not None:
-                    pending.append(found)
+                    pending.append((found, variables))
     return refused
+
+
+def _named_layers(layer: Sdf.Layer, variables: Mapping[str, Any]) -> Iterator[str]:
+    """What a layer is composed with, in any variant, and its value clips; as it writes them.
+
+    ``variables``: values for its expressions.
+    """
+    _, everything, _ = UsdUtils.ExtractExternalReferences(layer.identifier)
+    inmost = {asset: asset.rstrip("]").rpartition(_PACKAGE)[2] for asset in everything}
+    clips = [asset for asset, name in inmost.items() if Path(name).suffix.lower() in STAGES]
+    for asset in sorted({*layer.GetCompositionAssetDependencies(), *clips}):
+        if Sdf.VariableExpression.IsExpression(asset):
+            value = Sdf.VariableExpression(asset).Evaluate(dict(variables)).value
+            if isinstance(value, str) and value:
+                yield value
+        elif asset:
+            yield asset
+
+
+def _stand_in(path: Path, identifier: str) -> Sdf.Layer:
+    """An empty layer of memory that USD finds in the place of a file. Raises InputError."""
+    found = Sdf.Layer.Find(identifier)  # of another stage of this process
+    if found is not None:
+        return found
+    try:
+        return Sdf.Layer.New(Sdf.FileFormat.FindById("usda"), identifier)
+    except Tf.ErrorException as problem:  # within a package, or with arguments for its format
+        text = f"{identifier}: outside the declared roots; want it inside, or --root"
+        raise InputError(path, text) from problem
 
 
 def _opened(path: Path) -> Sdf.Layer:

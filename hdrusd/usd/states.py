@@ -16,7 +16,7 @@ import numpy.typing as npt
 from pxr import Gf, Sdf
 
 from hdrusd.legacy.scene import Node
-from hdrusd.usd.names import unique
+from hdrusd.usd.names import Taken, unique
 
 #: Variants of a node times its children. What has more is shown in its current state only.
 MOST = 1 << 16
@@ -34,6 +34,7 @@ class States:
     selected: int = 0
     ranges: tuple[tuple[float, float], ...] = ()  # of each level of detail, as the node has them
     on_screen: bool = False  # ranges are the inverse of sizes on the screen, in pixels
+    too_many: int = 0  # that there are, where only the selected one is told here
 
     @property
     def current(self) -> Flags:
@@ -41,25 +42,40 @@ class States:
         return np.asarray(self.shown[self.selected])
 
 
-def states_of(node: Node) -> States | None:
-    """The states of a node; None where there is one alone that shows all children."""
+def states_of(node: Node, most: int = MOST) -> States | None:
+    """The states of a node; None where there is one alone that shows all children.
+
+    Where states times children are more than ``most``, the selected one alone.
+    """
     count = len(node.children)
     if count == 0:
         return None
     found = None
     if node.kind == "lod" and len(node.lod_ranges) > 1:
-        found = replace(_levels(node.lod_ranges[:count], count), on_screen=node.lod_on_screen)
+        found = replace(_levels(node.lod_ranges[:count], count, most), on_screen=node.lod_on_screen)
     elif node.kind == "switch":
-        found = _switch(node, count)
+        found = _switch(node, count, most)
     elif node.kind == "sequence" and count > 1:
-        names = tuple(f"frame{number}" for number in range(count))
-        found = States("frame", names, np.eye(count, dtype=np.bool_))
-    if found is None or (len(found.names) == 1 and found.current.all()):
+        found = _each("frame", count, most)
+    if found is None or (len(found.names) == 1 and found.current.all() and not found.too_many):
         return None
     return found
 
 
-def _levels(ranges: Sequence[tuple[float, float]], count: int) -> States:
+def _each(kind: str, count: int, most: int) -> States:
+    """States that show one child each."""
+    if count * count > most:
+        return _alone(kind, np.arange(count) == 0, count)
+    names = tuple(f"{kind}{number}" for number in range(count))
+    return States(kind, names, np.eye(count, dtype=np.bool_))
+
+
+def _alone(kind: str, current: Flags, states: int) -> States:
+    """The current state of too many."""
+    return States(kind, ("current",), current[None], too_many=states)
+
+
+def _levels(ranges: Sequence[tuple[float, float]], count: int, most: int) -> States:
     """What is in range from one limit to the next; the nearest first.
 
     A child without a range is in none; where no range is one, each child is a level.
@@ -67,9 +83,12 @@ def _levels(ranges: Sequence[tuple[float, float]], count: int) -> States:
     low, high = np.array(ranges, np.float64).T
     real = high > low
     if not real.any():
-        names = tuple(f"lod{number}" for number in range(count))
-        return States("lod", names, np.eye(count, dtype=np.bool_))
+        return _each("lod", count, most)
     limits = np.unique([low[real], high[real]])
+    if (len(limits) - 1) * count > most:
+        nearest = np.zeros(count, np.bool_)
+        nearest[: len(low)] = real & (low <= limits[0])
+        return _alone("lod", nearest, len(limits) - 1)
     shown = np.zeros((len(limits) - 1, count), np.bool_)
     shown[:, : len(low)] = real & (low <= limits[:-1, None]) & (high > limits[:-1, None])
     # Neighbours that show the same are one level, gaps none.
@@ -84,12 +103,15 @@ def _levels(ranges: Sequence[tuple[float, float]], count: int) -> States:
     return States("lod", names, shown[starts], ranges=spans)
 
 
-def _switch(node: Node, count: int) -> States:
+def _switch(node: Node, count: int, most: int) -> States:
     """The masks that the source has; of one alone what a person would want to choose from."""
     current = _mask(node.switch_on, count)
+    states = len(node.switch_masks) if len(node.switch_masks) > 1 else count + 2
+    if states * count > most:
+        return _alone("switch", np.array(current, np.bool_), states)
     rows: list[tuple[bool, ...]] = []
     names: list[str] = []
-    taken: set[str] = set()
+    taken: Taken = {}
 
     def add(name: str, row: tuple[bool, ...]) -> None:
         rows.append(row)

@@ -128,15 +128,11 @@ def pose(node: Node, codes: Doubles, rate: float, end: float) -> tuple[Doubles, 
             continue
         keys, values = samples(channel, rate, end)
         if channel.path == "rotation":
-            found["rotation"] = _turned(keys, values, codes)
+            found["rotation"] = _turned(keys, _units(values), codes)
         else:
             columns = [np.interp(codes, keys, column) for column in values.T]
             found[channel.path] = np.stack(columns, axis=1)
-    turns = found["rotation"]
-    lengths = np.sqrt((turns * turns).sum(axis=1, keepdims=True))
-    none = np.array([0.0, 0.0, 0.0, 1.0])
-    turns = np.where(lengths > 0.0, turns / np.where(lengths > 0.0, lengths, 1.0), none)
-    return found["translation"], turns, found["scale"]
+    return found["translation"], _units(found["rotation"]), found["scale"]
 
 
 def matrices(node: Node, codes: Doubles, rate: float, end: float) -> Doubles:
@@ -158,6 +154,13 @@ def matrices(node: Node, codes: Doubles, rate: float, end: float) -> Doubles:
     made[:, :3, :3] *= scales[:, :, None]
     made[:, 3, :3], made[:, 3, 3] = places, 1.0
     return made
+
+
+def _units(turns: Doubles) -> Doubles:
+    """Quaternions (n, 4) of length 1; no turn for those of length 0."""
+    lengths = np.sqrt((turns * turns).sum(axis=1, keepdims=True))
+    there = lengths > 0.0
+    return np.where(there, turns / np.where(there, lengths, 1.0), (0.0, 0.0, 0.0, 1.0))
 
 
 def _turned(keys: Doubles, values: Doubles, codes: Doubles) -> Doubles:

@@ -12,7 +12,7 @@ from hdrusd.legacy.scene import LegacyScene, Mesh, Node
 from hdrusd.report import Kind, Report
 from hdrusd.usd.camera import write_camera
 from hdrusd.usd.fixtures import PlacedMesh
-from hdrusd.usd.material import bind, bind_faces, keep_extras
+from hdrusd.usd.material import bind, bind_faces, display_name, keep_extras
 from hdrusd.usd.mesh import write_mesh
 from hdrusd.usd.names import Names
 from hdrusd.usd.sharing import Copies, every_node, shared_nodes
@@ -90,25 +90,21 @@ class TreeWriter:
         self._shared = shared_nodes(scene.roots, self._skeletons.pinned)
         self._prototypes: dict[int, Sdf.Path] = {}  # of nodes, by id
         self._mesh_prototypes: dict[int, Sdf.Path] = {}  # by number
-        self._uses: dict[int, int] = {}
 
     def write(self) -> None:
         """All of it."""
-        self._uses = self._mesh_uses()
+        self._make_prototypes()
         stack = self._entered(self.scene.roots, self.root, [True] * len(self.scene.roots))
         while stack:
             node, path, shown = stack.pop()
             if id(node) in self._shared:
-                UsdGeom.Xform.Define(self.stage, path)
                 if not shown:
                     UsdGeom.Imageable(self.stage.GetPrimAtPath(path)).MakeInvisible()
-                known = self._prototypes.get(id(node))
-                if known is not None:
-                    self.copies.add(path, known)
-                    continue
-                prototype = self._new_prototype(node.name)
-                self._prototypes[id(node)] = prototype
+                prototype = self._prototypes[id(node)]
+                written = prototype in self.copies.uses
                 self.copies.add(path, prototype)
+                if written:
+                    continue
                 path, shown = prototype, True
             self._write_node(node, path, visible=shown and node.visible)
             below = self._entered(self._children(node), path, self._shown(node, path))
@@ -129,8 +125,35 @@ class TreeWriter:
         self, nodes: Sequence[Node], parent: Sdf.Path, shown: Sequence[bool]
     ) -> list[tuple[Node, Sdf.Path, bool]]:
         """Nodes with their paths, the first one last."""
-        named = [self.names.child(parent, node.name) for node in nodes]
+        named = self._siblings(parent, [(node.name, "Xform") for node in nodes])
         return list(zip(nodes, named, shown, strict=True))[::-1]
+
+    def _siblings(self, parent: Sdf.Path, wanted: Sequence[tuple[str, str]]) -> list[Sdf.Path]:
+        """Prims below ``parent``, of names and types, at once.
+
+        One by one they cost a stage the square of their number.
+        """
+        if not wanted:
+            return []
+        paths = [self.names.child(parent, name) for name, _ in wanted]
+        with Sdf.ChangeBlock():
+            spec = self.layer.GetPrimAtPath(parent)
+            for path, (_, kind) in zip(paths, wanted, strict=True):
+                Sdf.PrimSpec(spec, path.name, Sdf.SpecifierDef, kind)
+        return paths
+
+    def _make_prototypes(self) -> None:
+        """Those of shared nodes and of meshes that stand in several, still empty."""
+        nodes = [node for node in every_node(self.scene.roots) if id(node) in self._shared]
+        meshes = [index for index, count in self._mesh_uses().items() if count > 1]
+        if not nodes and not meshes:
+            return
+        self.stage.CreateClassPrim(PROTOTYPES)
+        wanted = [node.name for node in nodes]
+        wanted += [self.scene.meshes[index].name for index in meshes]
+        paths = self._siblings(PROTOTYPES, [(name, "Xform") for name in wanted])
+        self._prototypes = dict(zip(map(id, nodes), paths[: len(nodes)], strict=True))
+        self._mesh_prototypes = dict(zip(meshes, paths[len(nodes) :], strict=True))
 
     def _children(self, node: Node) -> list[Node]:
         """The children that become prims: joints on which nothing hangs do not."""
@@ -171,16 +194,16 @@ class TreeWriter:
             form.CreateVisibilityAttr(UsdGeom.Tokens.invisible)
         self.places.append(Place(node, path))
         bent = [index for index in node.meshes if self._bent(node, index)]
-        for index in node.meshes:
-            if index in bent:
-                continue
-            mesh = self.scene.meshes[index]
-            child = self.names.child(path, mesh.name)
+        still = [index for index in node.meshes if not self._bent(node, index)]
+        kinds = ["Xform" if index in self._mesh_prototypes else "Mesh" for index in still]
+        names = [self.scene.meshes[index].name for index in still]
+        paths = self._siblings(path, list(zip(names, kinds, strict=True)))
+        for index, child in zip(still, paths, strict=True):
             self.meshes.append(PlacedMesh(child, path, index))
-            if self._uses[index] > 1:
+            if index in self._mesh_prototypes:
                 self._instance(child, index)
             else:
-                self._mesh(child, mesh)
+                self._mesh(child, self.scene.meshes[index])
         if bent:
             self._skinned(node, path, bent)
         for index in node.cameras:
@@ -212,22 +235,14 @@ class TreeWriter:
         return prim
 
     def _instance(self, path: Sdf.Path, index: int) -> None:
-        if index not in self._mesh_prototypes:
-            mesh = self.scene.meshes[index]
-            holder = self._new_prototype(mesh.name)
-            UsdGeom.Xform.Define(self.stage, holder)
-            self._mesh(holder.AppendChild("Mesh"), mesh)
-            self._mesh_prototypes[index] = holder
-        UsdGeom.Xform.Define(self.stage, path)
-        self.copies.add(path, self._mesh_prototypes[index])
-
-    def _new_prototype(self, name: str) -> Sdf.Path:
-        self.stage.CreateClassPrim(PROTOTYPES)
-        return self.names.child(PROTOTYPES, name)
+        holder = self._mesh_prototypes[index]
+        if holder not in self.copies.uses:
+            self._mesh(holder.AppendChild("Mesh"), self.scene.meshes[index])
+        self.copies.add(path, holder)
 
     def _skinned(self, node: Node, path: Sdf.Path, meshes: Sequence[int]) -> None:
         root = self.names.child(path, self._skeletons.bones[id(node)].skin.name)
-        self.names.taken.setdefault(root, set()).add("Skeleton")
+        self.names.taken.setdefault(root, {})["Skeleton"] = 1
         self._skeletons.write(self.stage, root, node)
         for index in meshes:
             mesh = self.scene.meshes[index]
@@ -241,12 +256,13 @@ class TreeWriter:
         """Whether each child is written visible: all are, but for those of states too many."""
         children = self._children(node)
         every = [True] * len(children)
-        states = states_of(node)
+        states = states_of(node, MOST)
         if states is None:
             return every
         size = states.shown.size
-        if size > MOST or self._opinions + size > _MOST_OPINIONS:
-            text = f"{len(states.names)} states of {len(children)} nodes are too many for variants"
+        if states.too_many or self._opinions + size > _MOST_OPINIONS:
+            number = states.too_many or len(states.names)
+            text = f"{number} states of {len(children)} nodes are too many for variants"
             text = f"{text}; what the current one does not show is invisible"
             self._finding(Kind.REPLACED, "state-limit", node, text)
             shown: list[bool] = states.current.tolist()
@@ -330,9 +346,3 @@ class TreeWriter:
 
     def _finding(self, kind: Kind, code: str, node: Node, text: str) -> None:
         self.report.add(kind, code, node.source, node.name, text)
-
-
-def display_name(prim: Usd.Prim, name: str) -> None:
-    """Keep a source's name where the prim's differs."""
-    if name and prim.GetName() != name:
-        prim.SetDisplayName(name[:200])

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom
 
 from hdrusd.legacy import scene as legacy
 from hdrusd.photometry.light import PhotometricLight
@@ -20,13 +20,14 @@ from hdrusd.usd.ambient import write_ambient
 from hdrusd.usd.camera import write_camera
 from hdrusd.usd.fixtures import Lamp, PlacedMesh
 from hdrusd.usd.freed_lamps import free_lamps
+from hdrusd.usd.layer_files import new_layer, save_layer
 from hdrusd.usd.light import write_legacy_falloff, write_light
 from hdrusd.usd.light_string import write_light_string
-from hdrusd.usd.material import keep_extras
+from hdrusd.usd.material import display_name, keep_extras
 from hdrusd.usd.names import Names
 from hdrusd.usd.settings import Settings, write_settings
 from hdrusd.usd.transform import aim, is_flat, rigid, uniform_scale
-from hdrusd.usd.tree import CODES_PER_SECOND, PROTOTYPES, Place, TreeWriter, display_name
+from hdrusd.usd.tree import CODES_PER_SECOND, PROTOTYPES, Place, TreeWriter
 
 LAYERS = ("photometry", "look", "geometry")
 
@@ -54,15 +55,13 @@ class StageWriter:
         self.unit = source_unit / meters_per_unit  # scene units a source unit
         self.meters_per_unit = meters_per_unit
         top = Sdf.Path.absoluteRootPath
-        self.names = Names({top: {"Render", PROTOTYPES.name}})
+        self.names = Names({top: {"Render": 1, PROTOTYPES.name: 1}})
         self.places: list[Place] = []
         self.meshes: list[PlacedMesh] = []
         self.first_camera: str | None = None
-        root = Sdf.Layer.CreateNew(str(folder / f"{stem}.usda"))
+        root = new_layer(folder / f"{stem}.usda")
         self.layers = {
-            name: Sdf.Layer.CreateNew(
-                str(folder / f"{stem}.{name}.{'usdc' if name == 'geometry' else 'usda'}")
-            )
+            name: new_layer(folder / f"{stem}.{name}.{'usdc' if name == 'geometry' else 'usda'}")
             for name in LAYERS
         }
         root.subLayerPaths[:] = [f"./{Path(self.layers[n].identifier).name}" for n in LAYERS]
@@ -131,12 +130,15 @@ class StageWriter:
     def edit_materials(self, layer: str, write: Callable[[Usd.Stage, int, Sdf.Path], None]) -> None:
         """Call ``write(stage, index, path)`` for each material, into one layer."""
         self._edit(layer)
+        # Defined in each layer, not merely over: either stays whole when the other is muted. All
+        # at once: one by one they cost a stage the square of their number.
+        with Sdf.ChangeBlock():
+            for path in self.materials:
+                spec = Sdf.CreatePrimInLayer(self.layers[layer], path)
+                spec.specifier = Sdf.SpecifierDef
+                spec.typeName = "Material"
         for index, path in enumerate(self.materials):
             write(self.stage, index, path)
-            # Defined in each layer, not merely over: either stays whole when the other is muted.
-            spec = self.layers[layer].GetPrimAtPath(path)
-            spec.specifier = Sdf.SpecifierDef
-            spec.typeName = "Material"
 
     def write_light(
         self,
@@ -241,12 +243,7 @@ class StageWriter:
         """Select states and write all layers; the root, which names them, last. Raises OSError."""
         self.tree.select(self.layers["geometry"], self.layers["photometry"])
         for layer in (*self.layers.values(), self.stage.GetRootLayer()):
-            try:
-                saved = layer.Save()
-            except Tf.ErrorException as problem:
-                raise OSError(f"{layer.identifier}: {problem}") from problem
-            if not saved:
-                raise OSError(f"{layer.identifier}: cannot be written")
+            save_layer(layer)
 
     def _edit(self, layer: str | None) -> None:
         target = self.stage.GetRootLayer() if layer is None else self.layers[layer]

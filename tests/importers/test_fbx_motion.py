@@ -100,7 +100,7 @@ def test_skin(tmp_path: Path) -> None:
         )
         fbx.connect(bone, cluster)
     assert body == geometry - 1
-    scene, _ = load(fbx.write(tmp_path))
+    scene, report = load(fbx.write(tmp_path))
     (found,) = scene.skins
     by_name = {node.name: node for node in scene.roots}
     assert by_name["square"].skin == 0
@@ -116,7 +116,10 @@ def test_skin(tmp_path: Path) -> None:
         zip(mesh.joint_indices, mesh.joint_weights, strict=True)
     ):
         np.add.at(dense[point], joints, weights)
-    np.testing.assert_allclose(dense, [[1, 0], [0.75, 0.25], [0.25, 0.75], [0, 0]], atol=1e-7)
+    np.testing.assert_allclose(dense, [[1, 0], [0.75, 0.25], [0.25, 0.75], [1, 0]], atol=1e-7)
+    # The last one is held by none; with weights of 0 it would go to the origin.
+    (finding,) = [f for f in report if f.code == "skin-weights"]
+    assert "1 of 4 points" in finding.text
 
 
 def test_geometric_transform_of_a_skinned_mesh_counts_once(tmp_path: Path) -> None:

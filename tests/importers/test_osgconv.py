@@ -1,4 +1,4 @@
-"""OpenSceneGraph's binary files, by osgconv."""
+"""OpenSceneGraph's .ive by osgconv; what it writes, by our own reader."""
 
 from __future__ import annotations
 
@@ -62,25 +62,22 @@ def square(folder: Path, name: str, picture: str) -> Path:
     return folder / name
 
 
-@pytest.mark.parametrize("suffix", [".ive", ".osgb"])
-def test_without_osgconv_one_line_says_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str
-) -> None:
+def test_without_osgconv_one_line_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    file = tmp_path / f"street{suffix}"
-    heads = {".ive": b"\4\3\2\1", ".osgb": b"\xa1\x0e\x91\x6cEE\xfb\x1a"}
-    file.write_bytes(heads[suffix])
+    file = tmp_path / "street.ive"
+    file.write_bytes(b"\4\3\2\1")
     with pytest.raises(InputError, match="install the package openscenegraph"):
         load(file)
 
 
 @needs_osgconv
-@pytest.mark.parametrize("name", ["derived-osg/night_street.osgb", "derived-osg/night_street.ive"])
-def test_the_street_is_that_of_the_text(testdata: Path, name: str) -> None:
+def test_the_street_is_that_of_the_text(testdata: Path) -> None:
     text, _ = load(testdata / "data/derived-osg/night_street.osgt")
-    scene, report = load(testdata / "data" / name)
+    scene, report = load(testdata / "data/derived-osg/night_street.ive")
     picture = "materials[2].diffuse_map.image"
-    assert differences(text, scene) == ["source", f"{picture}.path", f"{picture}.pixels"]
+    # the text has six digits
+    found = differences(text, scene, rtol=5e-6)
+    assert found == ["source", f"{picture}.path", f"{picture}.pixels"]
     held, named = (s.materials[2].diffuse_map for s in (scene, text))
     assert held is not None
     assert named is not None
@@ -98,11 +95,6 @@ def test_the_street_is_that_of_the_text(testdata: Path, name: str) -> None:
         ("delta3d/examples/data/StaticMeshes/house1.ive", 5, 57, 5, 5, 0),
         ("derived-osg/night_street.ive", 14, 86, 4, 1, 6),
         ("derived-osg/stop_light.ive", 3, 260, 1, 1, 0),
-        ("derived-osg/night_street.osgb", 14, 86, 4, 1, 6),
-        ("derived-osg/lamp_post.osgb", 1, 270, 1, 1, 1),
-        # one more material than osg::Materials: OpenGL's own, for what has a texture alone
-        ("osgearth/data/street_lamp.osgb", 1, 2024, 1, 1, 1),
-        ("osgearth/data/streetlight.osgb", 4, 2152, 4, 0, 0),
     ],
 )
 def test_real_files(
@@ -123,26 +115,9 @@ def test_real_files(
     assert all(texture.image.data or texture.image.pixels is not None for texture in maps)
 
 
-@needs_osgconv
-def test_a_compressed_picture_arrives_as_dds(testdata: Path) -> None:
-    scene, _ = load(testdata / "data/osgearth/data/street_lamp.osgb")
-    texture = scene.materials[0].diffuse_map
-    assert texture is not None
-    assert texture.image.data is not None
-    assert (texture.image.data[:4], texture.image.data[84:88]) == (b"DDS ", b"DXT1")
-
-
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("empty.ive", "empty"),
-        ("lfs_pointer.osgb", "Git LFS pointer"),
-        pytest.param("trunc_streetlight.osgb", "osgconv failed", marks=needs_osgconv),
-    ],
-)
-def test_hostile_files(testdata: Path, name: str, said: str) -> None:
-    with pytest.raises(InputError, match=f"{name}: .*{said}.*; ?want|{name}: .*{said}"):
-        load(testdata / "data/hostile" / name)
+def test_an_empty_file(testdata: Path) -> None:
+    with pytest.raises(InputError, match=r"empty\.ive: empty; want \.ive"):
+        load(testdata / "data/hostile/empty.ive")
 
 
 def test_another_file_of_that_name(tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ from fbx_builder import needs_ufbx
 from file_watch import watched
 from overlaid import HEAD, paint, stage_file
 from photometric_files import ies_text
+from pxr import UsdUtils
 from test_assimp import AC3D, needs_assimp
 from test_osgconv import TEXT, needs_osgconv
 
@@ -205,7 +206,7 @@ def a_stage_profile(file: Path, name: str) -> None:
 Writer = Callable[[Path, str], None]
 
 #: Suffix of the source, who writes it, and the file that lies outside.
-WRITERS: list[tuple[str, Writer, str]] = [
+WRITERS = [
     (".obj", an_obj, "secret.png"),
     (".obj", an_obj_library, "secret.mtl"),
     (".gltf", gltf, "secret.png"),
@@ -216,23 +217,26 @@ WRITERS: list[tuple[str, Writer, str]] = [
     (".flt", a_flt, "secret.png"),
     (".flt", a_flt_reference, "secret.flt"),
     (".usda", a_stage_texture, "secret.png"),
-    (".usda", a_stage_emission, "secret.png"),
     (".usda", a_stage_sublayer, "secret.usda"),
     (".usda", a_stage_reference, "secret.usda"),
     (".usda", a_stage_payload, "secret.usda"),
     (".usda", a_stage_variant, "secret.usda"),
     (".usda", a_stage_expression, "secret.usda"),
     (".usda", a_stage_clip, "secret.usda"),
-    (".usda", a_stage_sky, "secret.png"),
-    (".usda", a_stage_screen, "secret.png"),
-    (".usda", a_stage_profile, "secret.ies"),
-]
-ALL_WRITERS = [
-    *WRITERS,
+    (".usda", a_stage_sublayer, "secret.usdz"),
+    (".usda", a_stage_reference, "secret.usdz"),
     pytest.param(".osgb", a_binary_osg, "secret.png", marks=needs_osgconv),
     pytest.param(".ive", a_binary_osg, "secret.png", marks=needs_osgconv),
     pytest.param(".fbx", an_fbx, "secret.png", marks=needs_ufbx),
     pytest.param(".ac", an_ac3d, "secret.png", marks=needs_assimp),
+]
+
+#: What a stage names and a conversion has no need to read: it stays the source's.
+UNREAD = [
+    (".usda", a_stage_emission, "secret.png"),
+    (".usda", a_stage_sky, "secret.png"),
+    (".usda", a_stage_screen, "secret.png"),
+    (".usda", a_stage_profile, "secret.ies"),
 ]
 
 
@@ -246,6 +250,8 @@ def outside(tmp_path: Path) -> Path:
     a_flt(folder / "secret.flt", "none.rgb")
     stage_file(folder / "secret.usda", 'def SphereLight "Secret" {\n}')
     (folder / "secret.ies").write_text(ies_text())
+    a_stage_texture(folder / "packed.usda", "secret.png")
+    UsdUtils.CreateNewUsdzPackage(str(folder / "packed.usda"), str(folder / "secret.usdz"))
     return folder
 
 
@@ -259,15 +265,10 @@ def attempt(source: Path, output: Path, **options: object) -> Report:
     return report
 
 
-@pytest.mark.parametrize(("suffix", "write", "file"), ALL_WRITERS)
+@pytest.mark.parametrize(("suffix", "write", "file"), [*WRITERS, *UNREAD])
 @pytest.mark.parametrize("form", ["above", "absolute", "uri", "link"])
 def test_nothing_outside_is_opened(
-    tmp_path: Path,
-    outside: Path,
-    suffix: str,
-    write: Callable[[Path, str], None],
-    file: str,
-    form: str,
+    tmp_path: Path, outside: Path, suffix: str, write: Writer, file: str, form: str
 ) -> None:
     inside = tmp_path / "database"
     inside.mkdir()
@@ -283,15 +284,17 @@ def test_nothing_outside_is_opened(
     with watched(outside) as touched:
         report = attempt(inside / f"a{suffix}", tmp_path / "out" / "a.usda")
         assert touched() == []
-    kept = [path.name for path in (tmp_path / "out").rglob("*")] if report else []
-    assert not [one for one in kept if "secret" in one]
-    if form != "uri":  # which some formats do not have: a strange file name then
+    kept = [path.name for path in (tmp_path / "out").rglob("*")]
+    assert not [one for one in kept if "secret" in one or "link" in one]
+    if (suffix, write, file) in UNREAD:
+        assert kept
+    elif form != "uri":  # which some formats do not have: a strange file name then
         assert "file-refused" in report.codes() or not (tmp_path / "out" / "a.usda").exists()
 
 
-@pytest.mark.parametrize(("suffix", "write", "file"), ALL_WRITERS)
+@pytest.mark.parametrize(("suffix", "write", "file"), WRITERS)
 def test_what_a_root_allows_is_opened(
-    tmp_path: Path, outside: Path, suffix: str, write: Callable[[Path, str], None], file: str
+    tmp_path: Path, outside: Path, suffix: str, write: Writer, file: str
 ) -> None:
     inside = tmp_path / "database"
     inside.mkdir()
@@ -300,6 +303,32 @@ def test_what_a_root_allows_is_opened(
         report = attempt(inside / f"a{suffix}", tmp_path / "out" / "a.usda", roots=(outside,))
         assert touched() == [file]
     assert "file-refused" not in report.codes()
+
+
+def test_a_picture_in_a_package_outside_is_not_copied(tmp_path: Path, outside: Path) -> None:
+    """USD opens the package to see whether there is such a picture; more than that nobody does."""
+    inside = tmp_path / "database"
+    a_stage_texture(inside / "a.usda", "../outside/secret.usdz[0/secret.png]")
+    report = attempt(inside / "a.usda", tmp_path / "out" / "a.usda")
+    assert "file-refused" in report.codes()
+    assert sorted(path.name for path in (tmp_path / "out").rglob("*")) == [
+        "a.photometry.usda",
+        "a.usda",
+    ]
+    allowed = attempt(inside / "a.usda", tmp_path / "all" / "a.usda", roots=(outside,))
+    assert "file-refused" not in allowed.codes()
+    assert list((tmp_path / "all").rglob("*.exr"))
+
+
+@pytest.mark.parametrize("tail", ["usdz[packed.usda]", "usda:SDF_FORMAT_ARGS:a=b"])
+def test_what_no_empty_layer_can_stand_in_for_is_refused(
+    tmp_path: Path, outside: Path, tail: str
+) -> None:
+    source = tmp_path / "database" / "a.usda"
+    a_stage_sublayer(source, f"../outside/secret.{tail}")
+    with pytest.raises(InputError, match="outside the declared roots; want it inside, or --root"):
+        convert(source, tmp_path / "out" / "a.usda", Options(), Report())
+    convert(source, tmp_path / "out" / "a.usda", Options(roots=(outside,)), Report())
 
 
 def test_the_watch_sees_reading_writing_and_removing(tmp_path: Path) -> None:

@@ -315,6 +315,21 @@ def test_states_too_many_for_variants_are_shown_by_visibility(
     assert hdrusd.usd.states.MOST > 8
 
 
+@pytest.mark.parametrize("kind", ["switch", "sequence", "lod"])
+@pytest.mark.parametrize("ranged", [True, False])
+def test_states_too_many_are_not_told_one_by_one(kind: str, ranged: bool) -> None:
+    # All states of them would be 400 million flags.
+    count = 20_000
+    ranges = tuple((float(i), float(i + 1)) if ranged else (0.0, 0.0) for i in range(count))
+    on = tuple(i == 0 for i in range(count))
+    tree = node("g", children=[node("a")] * count, kind=kind, lod_ranges=ranges, switch_on=on)
+    found = states_of(tree)
+    assert found is not None
+    assert found.too_many in (count, count + 2)
+    assert found.shown.shape == (1, count)
+    assert np.flatnonzero(found.current).tolist() == [0]
+
+
 @pytest.mark.parametrize(
     "tree",
     [

@@ -13,7 +13,15 @@ from hypothesis import strategies as st
 from pxr import Gf, Usd, UsdGeom
 
 from hdrusd.legacy.scene import TRS, Channel
-from hdrusd.usd.transform import aim, is_flat, last_key, rigid, uniform_scale, write_transform
+from hdrusd.usd.transform import (
+    aim,
+    is_flat,
+    last_key,
+    matrices,
+    rigid,
+    uniform_scale,
+    write_transform,
+)
 
 RATE = 24.0
 NUMBERS = st.floats(-10.0, 10.0).map(lambda v: round(v, 3))
@@ -107,6 +115,14 @@ def test_rotations_are_slerped() -> None:
     form, _ = written(None, turn)
     # A quarter of the time is a quarter of the angle, which linear interpolation misses by 3.
     assert matrix(form, 6.0)[:3, :3] == pytest.approx(rotation(about_y(30.0)), abs=1e-6)
+
+
+@pytest.mark.parametrize("length", [1.0, 0.5, 2.0])
+def test_joints_turn_as_nodes_do_whatever_the_length_of_a_quaternion(length: float) -> None:
+    second = np.multiply(about_y(90.0), length)
+    turn = channel("rotation", [0.0, 1.0], [about_y(0.0), second])
+    (made,) = matrices(node(animation=(turn,)), np.array([12.0]), RATE, 24.0)
+    assert made[:3, :3] == pytest.approx(rotation(about_y(45.0)), abs=1e-12)
 
 
 def test_a_quaternion_of_no_length_is_no_turn() -> None:
