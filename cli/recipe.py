@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import click
 
@@ -33,6 +34,17 @@ def command() -> None:
     multiple=True,
     help="Folder where missing textures are looked for.",
 )
+@click.option(
+    "--source-unit",
+    type=click.FloatRange(1e-9, 1e9),
+    metavar="METERS",
+    help="Metres a source unit, where the format does not say or is wrong.",
+)
+@click.option(
+    "--up",
+    type=click.Choice(["Y", "Z"]),
+    help="Up axis of the source, where the format does not say or is wrong.",
+)
 @click.option("--overwrite", is_flag=True, help="Replace OUTPUT where it exists.")
 @click.option("-q", "--quiet", is_flag=True, help="No findings on the terminal.")
 def init(
@@ -40,6 +52,8 @@ def init(
     output: Path | None,
     roots: tuple[Path, ...],
     search: tuple[Path, ...],
+    source_unit: float | None,
+    up: Literal["Y", "Z"] | None,
     overwrite: bool,
     quiet: bool,
 ) -> None:
@@ -49,6 +63,7 @@ def init(
     textures; numbers are typical of each class, with its range and source. What is only
     suspected is commented out. Edit it, then: hdrusd convert SOURCE STAGE.usda
     """
+    from hdrusd.importers.importer import Resolver
     from hdrusd.photometry.sidecar import FILE_NAME
     from hdrusd.recipe.making import write_recipe
     from hdrusd.report import Report
@@ -62,7 +77,9 @@ def init(
     if not printed and output.exists() and not overwrite:
         raise HdrusdError(f"{output}: exists; want another OUTPUT, or --overwrite")
     report = Report()
-    found = write_recipe(source, None if printed else output, report, roots, search)
+    resolver = Resolver(source, report, roots, search)
+    target = None if printed else output
+    found = write_recipe(resolver, target, source_unit=source_unit, up=up)
     if printed:
         click.echo(found.text, nl=False)
     tell(report, quiet)

@@ -7,8 +7,6 @@ units) or nodes (``match``, with ``offset`` in their own space), and says all th
 
 from __future__ import annotations
 
-from fnmatch import fnmatchcase
-
 from hdrusd.errors import SourceRef
 from hdrusd.legacy.scene import TRS, LegacyScene, Light, Node, Vec3
 from hdrusd.photometry.sidecar import Rule, Sidecar
@@ -38,7 +36,7 @@ def add_lamps(scene: LegacyScene, sidecar: Sidecar, up: str) -> dict[int, Rule]:
             rule.matched = True
         if "match" in rule.values:
             for node in nodes:
-                if fnmatchcase(node.name, rule.pattern):
+                if rule.fits((node.name,)):
                     node.lights.append(index)
                     rule.matched = True
     return rules

@@ -40,7 +40,8 @@ class SourceRef:
     place: int | str | None = None
 
     def __str__(self) -> str:
-        return self.file.name if self.place is None else f"{self.file.name}:{self.place}"
+        name = one_line(self.file.name)
+        return name if self.place is None else f"{name}:{self.place}"
 
 
 class HdrusdError(Exception):

@@ -219,8 +219,13 @@ def test_an_output_that_is_a_folder_or_no_stage_is_refused(tmp_path: Path) -> No
     assert everything(tmp_path) == before
 
 
-def test_a_folder_of_textures_that_is_not_ours_is_not_touched(tmp_path: Path) -> None:
+@pytest.mark.parametrize("beside", [(), ("wall.usda",)])
+def test_a_folder_of_textures_that_is_not_ours_is_not_touched(
+    tmp_path: Path, beside: tuple[str, ...]
+) -> None:
     png(tmp_path / "wall.textures" / "brick.png")
+    for name in beside:  # a stage of somebody else
+        (tmp_path / name).write_text("#usda 1.0\n")
     source = obj(tmp_path / "wall.obj", "Kd 1 1 1\nmap_Kd wall.textures/brick.png")
     before = everything(tmp_path)
     with pytest.raises(InputError, match="not of an earlier conversion"):

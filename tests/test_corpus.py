@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import OpenImageIO as oiio
 import pytest
 
+from hdrusd.importers.assimp_library import find_library
 from tests import corpus, gallery
 from tests.corpus import CONVERTED, Row, corpus_files, markdown, run_corpus, totals
 
 #: Small real files: each format, texture folders beside the meshes, lights, cameras, packages.
 REAL = (
+    "assimp/Collada/cube_with_2UVs.DAE",
     "castle-demo/gltf/punctual_lights/test_lights.glb",
     "delta3d/examples/data/StaticMeshes/lamps/Lamppost_Trident_PHYSICS.osg",
     "derived-osg/night_street.osgt",
@@ -29,6 +33,14 @@ REAL = (
     "synthetic/night_street.3ds",
     "tinyobjloader/tr-and-d-issue-43.obj",
     "usd-wg/test_assets/TextureTransformTest/TextureTransformTest.usd",
+)
+
+#: Those that are read by what may not be installed.
+BY_OTHERS = (
+    ("assimp/AC/SphereWithLight.ac", find_library() is not None),
+    ("derived-osg/night_street.ive", shutil.which("osgconv") is not None),
+    ("osgearth/data/streetlight.osgb", shutil.which("osgconv") is not None),
+    ("ufbx/maya_material_chart_7700_binary.fbx", find_spec("ufbx") is not None),
 )
 
 #: What of the hostile files has nothing in it that can be trusted, or nothing left that can be
@@ -242,7 +254,8 @@ def test_hostile_files(testdata: Path, output: Path) -> None:
 @pytest.mark.usefixtures("gl")
 def test_real_files(testdata: Path, output: Path) -> None:
     folder = testdata / "data"
-    rows = run(folder, [folder / name for name in REAL], output)
+    names = [*REAL, *(name for name, here in BY_OTHERS if here)]
+    rows = run(folder, [folder / name for name in names], output)
     assert problems(rows) == {}
     refused = [name for name, row in rows.items() if row.code]
     assert refused == ["openmaterial/lights/pointLight.gltf"]  # lights alone

@@ -207,6 +207,14 @@ def test_the_command_writes_beside_the_source_what_convert_takes(tmp_path: Path)
     assert row["confidence"] == "low"
 
 
+def test_the_top_is_where_up_is(tmp_path: Path) -> None:
+    source = obj(tmp_path / "a.obj", "Kd 1 1 1")
+    source.write_text(source.read_text().replace("o Wall", "o Lamppost_1"))
+    assert "offset = [0.5, 1.0, 0.0]" in init(str(source), "-").stdout
+    # The square is flat across Z, so its middle is its top.
+    assert "offset = [0.5, 0.5, 0.0]" in init(str(source), "-", "--up", "Z").stdout
+
+
 def test_the_command_replaces_nothing_unasked(tmp_path: Path) -> None:
     source = obj(tmp_path / "a.obj", "Kd 1 1 1")
     (tmp_path / "photometry.toml").write_text("mine")

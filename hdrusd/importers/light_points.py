@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,8 +21,10 @@ from hdrusd.legacy.scene import Light
 Doubles = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-#: Different looks of the points of one node; with more, colours are rounded to quarters.
+#: Different looks of the points of one node, each a light. With more, colours are rounded to
+#: quarters; where that is not enough, sizes, intensities and beams are, too, ever more coarsely.
 MOST_LOOKS = 256
+_COARSER = (0, 1, 2, 3, 4, 6, 8, 16, 64, 256, 1024)
 
 #: Half-angle of a lamp that shines to all sides, degrees.
 ALL_SIDES = 180.0
@@ -55,14 +57,16 @@ def strings(
     source: SourceRef,
     notes: Callable[[int], Mapping[str, Any]],
 ) -> tuple[list[Light], bool]:
-    """A light for each look of the points, and whether colours had to be rounded.
+    """A light for each look of the points, and whether looks had to be rounded to be fewer.
 
     ``notes``: the raw values of the point of a row, for ``Light.extras``.
     """
-    look, first, which = _looks(points, points.color)
+    look, first, which = _looks(points)
     rounded = len(first) > MOST_LOOKS
-    if rounded:
-        look, first, which = _looks(points, np.round(points.color * 4.0) / 4.0)
+    for level in _COARSER:
+        if len(first) <= MOST_LOOKS:
+            break
+        look, first, which = _looks(_rounded(points, level))
     order = np.argsort(which, kind="stable")
     groups = np.split(order, np.cumsum(np.bincount(which, minlength=len(first)))[:-1])
     # In the order in which they stand in the file.
@@ -73,10 +77,39 @@ def strings(
     return made, rounded
 
 
-def _looks(points: LightPoints, color: Doubles) -> tuple[Doubles, Ints, Ints]:
+def _rounded(points: LightPoints, level: int) -> LightPoints:
+    """Looks that are fewer: at level 0 by their colours, in quarters.
+
+    At 1 by colours, sizes and intensities in quarters of an octave, angles in steps of 5
+    degrees; each level doubles these. What shines goes on to.
+    """
+    if level == 0:
+        return replace(points, color=np.round(points.color * 4.0) / 4.0)
+    coarse = 2.0 ** (level - 1)
+    beam, step = points.cutoff < ALL_SIDES, min(5.0 * coarse, 90.0)
+    cutoff = np.clip(np.round(points.cutoff / step) * step, step, ALL_SIDES - 5.0)
+    inner = np.minimum(np.round(points.inner / step) * step, cutoff)
+    return replace(
+        points,
+        color=_octaves(points.color, 0.25 * coarse),
+        intensity=_octaves(points.intensity, 0.25 * coarse),
+        radius=_octaves(points.radius, 0.25 * coarse),
+        cutoff=np.where(beam, cutoff, points.cutoff),
+        inner=np.where(beam, inner, points.inner),
+    )
+
+
+def _octaves(values: Doubles, step: float) -> Doubles:
+    """Values that are not negative to the nearest of these powers of two; 0 stays 0."""
+    there = values > 0.0
+    power = np.round(np.log2(np.where(there, values, 1.0)) / step) * step
+    return np.where(there, np.exp2(np.clip(power, -126.0, 126.0)), 0.0)
+
+
+def _looks(points: LightPoints) -> tuple[Doubles, Ints, Ints]:
     """The different looks (k, 8), the first row of each (k,), and which one a row has (n,)."""
     numbers = points.intensity, points.radius, points.cutoff, points.inner, points.on
-    columns = np.column_stack([color, *numbers])
+    columns = np.column_stack([points.color, *numbers])
     look, first, which = np.unique(columns, axis=0, return_index=True, return_inverse=True)
     return look, first.astype(np.int64), which.reshape(-1).astype(np.int64)
 

@@ -137,7 +137,8 @@ def read(function: str, resolver: Resolver, report: Report) -> LegacyScene:
             "limits": asdict(resolver.limits),
         }
         (folder / _TASK).write_text(json.dumps(task), encoding="utf-8")
-        modules = [Path(entry).absolute() for entry in sys.path]
+        # "" is where the user happens to be: no root.
+        modules = [*(Path(entry).absolute() for entry in sys.path if entry), _PYTHON[2]]
         run(
             [sys.executable, "-P", "-m", "hdrusd.importers.worker", str(folder)],
             folder=folder,

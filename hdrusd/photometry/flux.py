@@ -24,11 +24,14 @@ def flux(light: PhotometricLight) -> float | None:
         return 2.0 * math.pi * light.intensity * _up_to(math.pi, light.exponent)
     inner = outer * (1.0 - min(max(light.softness, 0.0), 1.0))
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    t = 0.5 * (nodes + 1.0)
-    angle = inner + (outer - inner) * t
-    edge = 1.0 - t * t * (3.0 - 2.0 * t)
-    along = edge * np.abs(np.cos(angle)) ** light.exponent * np.sin(angle)
-    fading = 0.5 * (outer - inner) * float(along @ weights)
+    middle = min(max(0.5 * math.pi, inner), outer)  # where |cos| has a corner
+    fading = 0.0
+    for low, high in ((inner, middle), (middle, outer)):
+        angle = low + (high - low) * 0.5 * (nodes + 1.0)
+        t = (angle - inner) / max(outer - inner, 1e-300)
+        edge = 1.0 - t * t * (3.0 - 2.0 * t)
+        along = edge * np.abs(np.cos(angle)) ** light.exponent * np.sin(angle)
+        fading += 0.5 * (high - low) * float(along @ weights)
     return 2.0 * math.pi * light.intensity * (_up_to(inner, light.exponent) + fading)
 
 

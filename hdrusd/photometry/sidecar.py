@@ -45,10 +45,11 @@ Unknown keys, values of the wrong kind and patterns that match nothing are findi
 
 from __future__ import annotations
 
+import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
+from fnmatch import translate
 from pathlib import Path
 from typing import Any
 
@@ -72,11 +73,19 @@ class Rule:
     values: Mapping[str, Any]
     matched: bool = False
     late: bool = False  # it fits something, but only what a rule before it has taken
+    _compiled: re.Pattern[str] | None = field(default=None, init=False, repr=False, compare=False)
 
     @property
     def pattern(self) -> str:
         """The shell pattern, case counts; a lamp that has places instead goes by its name."""
         return str(self.values.get("match", self.values.get("name", "Lamp")))
+
+    def fits(self, names: Iterable[str]) -> bool:
+        """Whether the pattern fits one of the names; no name is none."""
+        if self._compiled is None:  # thousands of rules are asked about thousands of things
+            self._compiled = re.compile(translate(self.pattern))
+        fits = self._compiled.match
+        return any(fits(name) for name in names if name)
 
     def number(self, key: str) -> float | None:
         """A number, or None where the rule does not say."""
@@ -128,7 +137,7 @@ class Sidecar:
         """The first rule of a section whose pattern fits one of the names."""
         first: Rule | None = None
         for rule in self.rules:
-            if rule.section != section or not any(fnmatchcase(n, rule.pattern) for n in names if n):
+            if rule.section != section or not rule.fits(names):
                 continue
             if first is None:
                 rule.matched = True

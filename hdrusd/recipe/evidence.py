@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from glob import escape
@@ -180,10 +181,10 @@ def _ground(scene: LegacyScene, where: Sequence[Place], up: tuple[float, float, 
 
 def _told_apart(found: list[Lead]) -> list[Lead]:
     """Names where one pattern would fit lamps of several kinds; narrow patterns go first."""
-    patterns = [lead.pattern for lead in found]
+    patterns = Counter(lead.pattern for lead in found)
     made = []
     for lead in found:
-        if patterns.count(lead.pattern) > 1 or len(lead.names) == 1:
+        if patterns[lead.pattern] > 1 or len(lead.names) == 1:
             made += [_renamed(lead, escape(name), len(lead.names)) for name in sorted(lead.names)]
         else:
             made.append(lead)

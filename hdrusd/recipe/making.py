@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +19,6 @@ from hdrusd.recipe.evidence import leads
 from hdrusd.recipe.places import Doubles
 from hdrusd.recipe.stage_scene import stage_scene
 from hdrusd.recipe.text import recipe
-from hdrusd.report import Report
 from hdrusd.units import TEXTURE_GAMMA
 from hdrusd.usd.source_stage import STAGES
 
@@ -35,18 +33,22 @@ class Recipe:
 
 
 def write_recipe(
-    source: Path,
+    resolver: Resolver,
     output: Path | None,
-    report: Report,
-    roots: Sequence[Path] = (),
-    search: Sequence[Path] = (),
+    *,
+    source_unit: float | None = None,
+    up: Literal["Y", "Z"] | None = None,
 ) -> Recipe:
-    """Read ``source``, write ``output`` (None: do not). Raises InputError."""
-    resolver = Resolver(source, report, roots, search)
+    """Read the resolver's source, write ``output`` (None: do not). Raises InputError.
+
+    ``source_unit``, metres, and ``up``: where the source does not say, or is wrong.
+    """
+    source, report = resolver.source, resolver.report
     if source.suffix.lower() in STAGES:
         scene = stage_scene(source, resolver.allowed, report)
     else:
         scene = read(resolver, report)
+    scene.unit_m, scene.up = source_unit or scene.unit_m, up or scene.up
     found = leads(scene, _picture)
     counted = sum(lead.counts for lead in found)
     text = recipe(source.name, found)

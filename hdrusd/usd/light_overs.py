@@ -130,7 +130,8 @@ def read_source_light(prim: Usd.Prim, places: Iterable[Usd.Prim]) -> SourceLight
     unit = UsdGeom.GetStageMetersPerUnit(prim.GetStage())
     moments: dict[float | None, Moment] = {}
     radius = 0.0
-    for time in times or [None]:
+    codes: list[float | None] = [*times] if times else [None]
+    for time in codes:
         code = Usd.TimeCode.Default() if time is None else Usd.TimeCode(time)
         reading = read_lux(prim, code, world=worlds[0], meters_per_unit=unit)
         assert reading is not None

@@ -38,12 +38,24 @@ def test_a_focus_alone_shines_both_ways() -> None:
     assert flux(lamp(exponent=3.0)) == pytest.approx(4000.0 * math.pi / 4.0, rel=1e-12)
 
 
-@pytest.mark.parametrize(("softness", "exponent"), [(1.0, 0.0), (0.4, 0.0), (0.7, 5.0)])
-def test_a_soft_edge_against_a_sum_over_directions(softness: float, exponent: float) -> None:
-    light = lamp(cutoff=70.0, softness=softness, exponent=exponent)
+@pytest.mark.parametrize(
+    ("cutoff", "softness", "exponent"),
+    [
+        (70.0, 1.0, 0.0),
+        (70.0, 0.4, 0.0),
+        (70.0, 0.7, 5.0),
+        (135.0, 1.0, 1.0),  # |cos| has a corner at 90 degrees
+        (179.0, 1.0, 3.0),
+        (135.0, 0.1, 1.0),
+    ],
+)
+def test_a_soft_edge_against_a_sum_over_directions(
+    cutoff: float, softness: float, exponent: float
+) -> None:
+    light = lamp(cutoff=cutoff, softness=softness, exponent=exponent)
     n = 200_000
     angle = (np.arange(n) + 0.5) * math.pi / n  # the midpoint rule's error goes with n^-2
-    outer = math.radians(70.0)
+    outer = math.radians(cutoff)
     inner = outer * (1.0 - softness)
     cone = cone_factor(
         np.cos(angle), np.array(inner), np.array(min(1 / (outer - inner), HARD_EDGE))

@@ -95,6 +95,8 @@ def put(*path: str | int, value: Any) -> Callable[[Any], None]:
         put("scene", "skins", 0, "joints", value=[0]),
         put("scene", "roots", value=[]),
         put("scene", "up", value="X"),
+        put("scene", "unit_m", value=0.0),
+        put("scene", "unit_m", value=-1.0),
         put("scene", "roots", value={}),
         put("findings", value=[{"kind": "grave", "code": "", "place": 1, "thing": "", "text": ""}]),
         put("findings", value=[{}]),
@@ -113,6 +115,18 @@ def test_a_scene_that_does_not_fit_together(tmp_path: Path, changed: Callable[[A
     assert len(load(tmp_path).meshes) == 1
     change(tmp_path, changed)
     with pytest.raises(InputError, match="nonsense"):
+        load(tmp_path)
+
+
+def test_a_string_of_no_lamps(tmp_path: Path) -> None:
+    left(tmp_path)
+
+    def changed(record: Any) -> None:
+        record["arrays"].append(["<f8", [0, 3]])
+        record["scene"]["lights"][0]["positions"] = {"array": len(record["arrays"]) - 1}
+
+    change(tmp_path, changed)
+    with pytest.raises(InputError, match="the places of a light do not fit"):
         load(tmp_path)
 
 

@@ -95,3 +95,37 @@ def test_many_colours_are_rounded() -> None:
     assert sum(light.lamps for light in made) == 5000
     few, exact = strings(points(colors[:MOST_LOOKS]), "p", HERE, lambda _: {})
     assert (len(few), exact) == (MOST_LOOKS, False)
+
+
+def test_points_of_other_sizes_each_become_few_lamps() -> None:
+    """Two octaves in quarters are at most 9 sizes; what is rounded is off by an eighth at most."""
+    rng = np.random.default_rng(3)
+    count = 2000
+    size = 0.01 * 2.0 ** rng.uniform(0.0, 2.0, count)
+    found, rounded = strings(points(np.ones((count, 3)), radius=size), "p", HERE, lambda _: {})
+    assert rounded
+    assert len(found) <= 10
+    assert sum(light.lamps for light in found) == count
+    for light in found:
+        assert light.positions is not None
+        assert light.radius is not None
+        row = light.positions[:, 0].astype(int)
+        assert np.abs(np.log2(size[row] / light.radius)).max() <= 0.125 + 1e-12
+
+
+def test_whatever_the_points_are_like_the_lamps_are_few_and_shine() -> None:
+    rng = np.random.default_rng(4)
+    count = 3000
+    wild = 10.0 ** rng.uniform(-30.0, 30.0, (4, count))
+    cutoff = rng.uniform(0.1, 180.0, count)
+    changes = {"intensity": wild[0], "radius": wild[1], "cutoff": cutoff, "inner": 0.5 * cutoff}
+    colors = np.stack([wild[2], wild[3], np.zeros(count)], axis=1)
+    found, rounded = strings(points(colors, **changes), "p", HERE, lambda _: {})
+    assert rounded
+    assert len(found) <= MOST_LOOKS
+    assert sum(light.lamps for light in found) == count
+    for light in found:
+        assert light.kind == "spot"
+        assert light.diffuse[0] > 0.0
+        assert light.diffuse[2] == 0.0
+        assert 0.0 < light.spot_cutoff < ALL_SIDES

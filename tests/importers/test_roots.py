@@ -320,6 +320,18 @@ def test_a_picture_in_a_package_outside_is_not_copied(tmp_path: Path, outside: P
     assert list((tmp_path / "all").rglob("*.exr"))
 
 
+def test_a_layer_that_was_refused_is_whole_where_a_root_allows_it(
+    tmp_path: Path, outside: Path
+) -> None:
+    source = tmp_path / "database" / "a.usda"
+    a_stage_sublayer(source, "../outside/secret.usda")
+    found = [
+        [row["name"] for row in convert(source, tmp_path / "a.usda", options, Report()).lights]
+        for options in (Options(), Options(roots=(outside,)))
+    ]
+    assert [sorted(names) for names in found] == [["Own"], ["Own", "Secret"]]
+
+
 @pytest.mark.parametrize("tail", ["usdz[packed.usda]", "usda:SDF_FORMAT_ARGS:a=b"])
 def test_what_no_empty_layer_can_stand_in_for_is_refused(
     tmp_path: Path, outside: Path, tail: str

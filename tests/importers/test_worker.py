@@ -131,8 +131,12 @@ def test_a_worker_sees_nothing_of_ours(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setenv("A_SECRET", "42")
     (tmp_path / "outside.txt").write_text("secret")
     (tmp_path / "in").mkdir()
+    # "" of python -c and -m is where the user is, which is no root.
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", ["", *sys.path])
     _, findings = ask(tmp_path / "in", "telling")
     said = {(finding.code, finding.thing): finding.text for finding in findings}
+    assert str(tmp_path) not in said["environment", "PYTHONPATH"].split(os.pathsep)
     assert ("environment", "A_SECRET") not in said
     assert said["environment", "LANG"] == "C"
     assert said["input", ""] == "''"
