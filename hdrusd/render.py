@@ -183,8 +183,8 @@ class Renderer:
         if (found.merged or found.pixels) and not self._told_lamps:
             self._told_lamps = True
             text = (
-                f"{found.merged} lamps below a pixel or beside the frame veil it together, within "
-                f"a degree; {100.0 * found.lost:.2g} % of all such light at the eye is left out"
+                f"{found.merged} lamps below a pixel or beside the frame veil it together, with "
+                f"all their light, each within {found.within:.2g} degrees of where it stands"
             )
             if found.pixels:
                 text += f"; {found.pixels} pixels that show lamps count beside them"

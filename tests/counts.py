@@ -24,8 +24,8 @@ from hdrusd.convert import convert
 from hdrusd.errors import InputError
 from hdrusd.importers.importer import Resolver, read
 from hdrusd.legacy.scene import LegacyScene, Node
-from hdrusd.usd.source_stage import STAGES
 from hdrusd.report import Report
+from hdrusd.usd.source_stage import STAGES
 
 COLUMNS = ("meshes", "triangles", "materials", "textures", "lights")
 

@@ -81,7 +81,7 @@ def test_a_node_gets_its_lamp(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("up", ["Y", "Z"])
-@pytest.mark.parametrize("shape", ["cutoff = 60", 'lumens = 9\nspread = "lambert"'])
+@pytest.mark.parametrize("shape", ["cutoff = 60\ncandela = 9", 'lumens = 9\nspread = "lambert"'])
 def test_a_lamp_without_an_axis_shines_down(tmp_path: Path, up: str, shape: str) -> None:
     source = floor(tmp_path)
     sidecar(tmp_path, f"[[lamp]]\nat = [[0, 5, 5]]\n{shape}\n")
@@ -124,7 +124,8 @@ def test_the_floor_below_is_lit(gl: Any, tmp_path: Path) -> None:
         ('[[lamp]]\nmatch = "none"\ncandela = 5\n', "sidecar-no-match"),
         ("[[lamp]]\nat = [[1, 2, 3]]\noffset = [1, 2, 3]\ncandela = 5\n", "sidecar-invalid"),
         ("[[lamp]]\nat = [[1, 2, 3]]\ncandela = 5\nlumens = 7\n", "sidecar-rival"),
-        ("[[lamp]]\nat = [[1, 2, 3]]\n", "light-estimate"),
+        ("[[lamp]]\nat = [[1, 2, 3]]\n", "sidecar-invalid"),
+        ("[[lamp]]\nat = [[1, 2, 3]]\ncandella = 5\n", "sidecar-unknown-key"),
     ],
 )
 def test_what_is_wrong_is_a_finding(tmp_path: Path, text: str, code: str) -> None:
@@ -143,3 +144,12 @@ def test_the_account_leads_back_to_the_entry(tmp_path: Path) -> None:
     (entry,) = (e for e in result.as_dict()["fix_first"] if e["what"].startswith("Lamp:"))
     assert entry["write"] is None  # a [[light]] entry would not reach it
     assert "lamp[1]" in entry["what"]
+
+
+def test_a_lamp_of_no_strength_does_not_shine(tmp_path: Path) -> None:
+    source = floor(tmp_path)
+    sidecar(tmp_path, "[[lamp]]\nat = [[0, 5, 0]]\ncandella = 250\n")
+    result = run(source)
+    assert result.lights == []
+    (finding,) = (f for f in result.report if f.code == "sidecar-invalid")
+    assert finding.text.startswith("no strength; not placed; want one of candela, ies,")

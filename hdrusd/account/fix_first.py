@@ -253,7 +253,11 @@ def _missing(scene: Scene) -> Iterator[Entry]:
     names = ", ".join(row["name"] for row in lost[:3]) + (", ..." if len(lost) > 3 else "")
     what = f"{len(lost)} missing texture{'s' if len(lost) > 1 else ''}: {names}"
     why = f"worn by {_percent(share)} of the surface, which has its plain colour instead"
-    yield Entry(max(share, 0.05) * _MISSING, what, why, COMMAND, "--search-path FOLDER")
+    # A file that lies outside the roots is there: the finding says which root would allow it.
+    refused = (f["text"] for f in scene.findings if f["code"] == "file-refused")
+    roots = (re.search(r"--root (.+) would allow it", text) for text in refused)
+    root = next((found[0].removesuffix(" would allow it") for found in roots if found), None)
+    yield Entry(max(share, 0.05) * _MISSING, what, why, COMMAND, root or "--search-path FOLDER")
 
 
 def _doubts(scene: Scene) -> Iterator[Entry]:

@@ -1,12 +1,17 @@
 """The lamps that a frame passes on to who veils it: rows of glare/veil.py, not too many.
 
-The most dazzling ones stay as they are. Of the others those that are within a cell of CELLS
-degrees become one, in their middle by lux: seen from a few cells away that is the same veil. What
-is still too much after the largest cells is left out, the least dazzling first.
+The most dazzling ones stay as they are. All others become few: a tree is split from the top, always
+the node with the largest lux times the square of its extent, until there are as many nodes as rows
+are left. A node is a lamp in the middle of its own by lux, with all their lux: none is lost. That
+middle has the first order of where they are, so that at theta degrees from a node of R degrees the
+veil is off by the order of (R / theta)^2 of the node's. Nearer than R it is that of one lamp in
+the middle, where there may be none.
 """
 
 from __future__ import annotations
 
+import heapq
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,22 +26,31 @@ MOST_LAMPS, MOST_PIXELS = 128, 512
 #: Lamps that stay as they are where there are more than MOST_LAMPS.
 ALONE = 64
 
-#: Degrees of the cells in which others are taken together, the first that is enough. Beyond the
-#: last one a halo would stand where no lamp is.
-CELLS = (0.125, 0.25, 0.5, 1.0)
+#: Lamps no farther apart than this (rad, along each axis) are in one place, as float32 has it.
+_ONE_PLACE = 2.0**-24
 
 
 class Dazzling(NamedTuple):
     """Rows (n, 6) in float32's numbers: lamps, then pixels; what was done to have few.
 
-    ``merged`` lamps stand together, ``lost`` is the share of all lux that is left out, and
-    ``pixels`` of those that show lamps are left out: these lamps count twice.
+    ``merged`` lamps stand together, each at most ``within`` degrees from the row that has its
+    lux, and ``pixels`` of those that show lamps are left out: these lamps count twice.
     """
 
     rows: Array
     merged: int = 0
-    lost: float = 0.0
+    within: float = 0.0
     pixels: int = 0
+
+
+class _Node(NamedTuple):
+    """Lamps that stand together. As a heap has it: the first to split, then the first made."""
+
+    urgency: float  # minus lux by the square of the extent; 0: all in one place
+    number: int
+    row: Array  # (6,)
+    extent: float  # rad from the row to its farthest lamp
+    lamps: Array  # (6, n)
 
 
 def most_dazzling(
@@ -46,30 +60,25 @@ def most_dazzling(
 ) -> Dazzling:
     """Of lamps (n, 6) and of pixels (m, 6) that show them what a frame passes on.
 
-    ``owner`` (m,): the lamp of each pixel, or -1; a pixel whose lamp is left out is as well. The
-    order of lamps is that of before where all are passed on.
+    ``owner`` (m,): the lamp of each pixel, or -1. The rows have all lux of the lamps. The order of
+    lamps is that of before where all are passed on.
     """
     given = np.asarray(lamps, np.float64).reshape(-1, LAMP)
     shown = np.asarray(pixels, np.float64).reshape(-1, LAMP)
     owners = np.asarray(owner, np.int64).reshape(-1)
-    kept, merged, lost = given, 0, 0.0
+    kept, merged, within = given, 0, 0.0
     if len(given) > MOST_LAMPS:
         order = np.argsort(-_weight(given), kind="stable")
-        others = order[ALONE:]
-        merged = len(others)
-        for cell in CELLS:
-            together, which = _together(given[others], cell)
-            if len(together) <= MOST_LAMPS - ALONE:
-                break
-        best = np.argsort(-_weight(together), kind="stable")[: MOST_LAMPS - ALONE]
-        kept = np.concatenate([given[order[:ALONE]], together[best]])
-        lost = max(1.0 - float(kept[:, 3:].sum() / max(given[:, 3:].sum(), 1e-300)), 0.0)
-        passed = np.ones(len(given), np.bool_)
-        passed[others[~np.isin(which, best)]] = False
-        shown = shown[(owners < 0) | passed[owners]]
-    most = np.sort(np.argsort(shown[:, 3:].min(axis=1, initial=0.0), kind="stable")[:MOST_PIXELS])
+        others = given[order[ALONE:]]
+        nodes = _together(others, MOST_LAMPS - ALONE)
+        kept = np.concatenate([given[order[:ALONE]], [node.row for node in nodes]])
+        merged, within = len(others), math.degrees(max(node.extent for node in nodes))
+    # Those of the weakest lamps are left out: little counts twice.
+    lux = np.append(given[:, 3:].sum(axis=1), 0.0)  # the last one is that of owner -1
+    twice = shown[:, 3:].min(axis=1, initial=0.0) * lux[owners]
+    most = np.sort(np.argsort(twice, kind="stable")[:MOST_PIXELS])
     rows = np.concatenate([kept, shown[most]]).astype(np.float32).astype(np.float64)
-    return Dazzling(rows, merged, lost, len(shown) - len(most))
+    return Dazzling(rows, merged, within, len(shown) - len(most))
 
 
 def _weight(lamps: Array) -> Array:
@@ -78,14 +87,32 @@ def _weight(lamps: Array) -> Array:
     return np.asarray(lamps[:, 3:].max(axis=1, initial=0.0) / np.maximum(angle, 0.01) ** 2)
 
 
-def _together(lamps: Array, cell: float) -> tuple[Array, npt.NDArray[np.intp]]:
-    """Lamps (n, 6) with those in one cell of ``cell`` degrees as one; and (n,) which is whose."""
-    across = np.degrees(np.arctan2(lamps[:, 0], -lamps[:, 2]))
-    up = np.degrees(np.arcsin(np.clip(lamps[:, 1], -1.0, 1.0)))
-    cells = np.floor(np.stack([across, up], axis=1) / cell).astype(np.int64)
-    found, which = np.unique(cells, axis=0, return_inverse=True)
-    lux = lamps[:, 3:].sum(axis=1, keepdims=True)
-    sums = np.zeros((len(found), LAMP))
-    np.add.at(sums, which.ravel(), np.concatenate([lamps[:, :3] * lux, lamps[:, 3:]], axis=1))
-    sums[:, :3] /= np.linalg.norm(sums[:, :3], axis=1, keepdims=True)
-    return sums, which.ravel()
+def _together(lamps: Array, most: int) -> list[_Node]:
+    """Lamps (n, 6) as at most ``most`` nodes, in the order in which they were made."""
+    nodes, made = [_node(np.ascontiguousarray(lamps.T), 0)], 1
+    while len(nodes) < most and nodes[0].urgency < 0.0:
+        whole = heapq.heappop(nodes).lamps
+        low, high = whole[:3].min(axis=1), whole[:3].max(axis=1)
+        axis = int(np.argmax(high - low))
+        # In the middle of the box: one that stands far off is by itself after few splits.
+        beyond = whole[axis] > (low[axis] + high[axis]) / 2.0
+        for part in (~beyond, beyond):
+            heapq.heappush(nodes, _node(whole.take(np.flatnonzero(part), axis=1), made))
+            made += 1
+    return sorted(nodes, key=lambda node: node.number)
+
+
+def _node(lamps: Array, number: int) -> _Node:
+    """Lamps (6, n) as one, in their middle by lux."""
+    ways, lights = lamps[:3], lamps[3:].sum(axis=1)
+    each = lamps[3] + lamps[4] + lamps[5]
+    middle = np.einsum("ij,j->i", ways, each)
+    length, lux = float(np.linalg.norm(middle)), float(lights.sum())
+    # All about the eye they have no middle: then it is where the brightest one is.
+    way = middle / length if length > 1e-9 * lux else ways[:, int(np.argmax(each))]
+    off = ways - way[:, None]
+    chord = math.sqrt(np.einsum("ij,ij->j", off, off).max())
+    extent = 2.0 * math.asin(min(chord / 2.0, 1.0))
+    apart = float(np.ptp(ways, axis=1).max()) > _ONE_PLACE
+    urgency = -lux * extent**2 if apart else 0.0
+    return _Node(urgency, number, np.concatenate([way, lights]), extent, lamps)

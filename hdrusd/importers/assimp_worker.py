@@ -143,7 +143,8 @@ class _SceneReader:
                 text = "neither point, spot, directional nor ambient; left out"
                 self.report.add(Kind.DROPPED, "assimp-light", place, name, text)
                 continue
-            numbers = [record[key] for key in ("position", "direction", "diffuse", "attenuation")]
+            keys = ("position", "direction", "diffuse", "attenuation", "inner", "outer")
+            numbers = [record[key] for key in keys]
             if not all(np.isfinite(values).all() for values in numbers):
                 text = "a light with numbers that are none; left out"
                 self.report.add(Kind.INVALID, "assimp-number", place, name, text)

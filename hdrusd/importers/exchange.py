@@ -36,7 +36,7 @@ SCENE = "scene.json"
 ARRAYS = "arrays.bin"
 
 #: Bytes of JSON that the parent parses; a record of a node takes about 200.
-_JSON_BYTES = 1 << 29
+_JSON_BYTES = 1 << 28
 #: What an array may be made of, as NumPy writes it.
 _DTYPES = {"|u1", "<i4", "<f4", "<f8"}
 _DIMENSIONS = 3

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 from hdrusd.errors import SourceRef
-from hdrusd.legacy.scene import Camera, LegacyScene, Light, Mesh, Node
+from hdrusd.legacy.scene import LegacyScene, Node
 from hdrusd.report import Kind, Report
 
 #: Names that a finding gives.
@@ -30,22 +30,17 @@ def note_unplaced(scene: LegacyScene, report: Report) -> None:
         stack.extend(node.children)
     lost = [mesh for index, mesh in enumerate(scene.meshes) if index not in meshes]
     triangles = sum(int((mesh.face_counts - 2).sum()) for mesh in lost)
-    _note(scene, report, f"meshes, of {triangles} triangles,", scene.meshes, meshes)
-    _note(scene, report, "lights", scene.lights, lights)
-    _note(scene, report, "cameras", scene.cameras, cameras)
+    _note(scene, report, f"meshes, of {triangles} triangles,", [mesh.name for mesh in lost])
+    away = [light.name for index, light in enumerate(scene.lights) if index not in lights]
+    _note(scene, report, "lights", away)
+    away = [camera.name for index, camera in enumerate(scene.cameras) if index not in cameras]
+    _note(scene, report, "cameras", away)
 
 
-def _note(
-    scene: LegacyScene,
-    report: Report,
-    what: str,
-    table: Sequence[Mesh] | Sequence[Light] | Sequence[Camera],
-    placed: Collection[int],
-) -> None:
-    lost = [thing for index, thing in enumerate(table) if index not in placed]
+def _note(scene: LegacyScene, report: Report, what: str, lost: Sequence[str]) -> None:
     if not lost:
         return
-    names = ", ".join(dict.fromkeys(thing.name[:60] for thing in lost[:_NAMED]))
+    names = ", ".join(dict.fromkeys(name[:60] for name in lost[:_NAMED]))
     more = ", ..." if len(lost) > _NAMED else ""
     text = f"{len(lost)} {what} that no node has: {names}{more}; they have no place, not written"
     report.add(Kind.DROPPED, "unplaced", SourceRef(scene.source), "", text)

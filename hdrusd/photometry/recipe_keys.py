@@ -158,6 +158,9 @@ _COMPANIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "ambient": {"altitude": ("preset",), "azimuth": ("preset",)},
 }
 
+#: Keys of which a lamp that is placed has at least one.
+STRENGTHS = frozenset({"candela", "lumens", "illuminance", "watts", "radiant_watts", "ies"})
+
 _COMPANIONS["lamp"] = {k: v for k, v in _COMPANIONS["light"].items() if k != "axis"} | {
     "offset": ("match",)
 }

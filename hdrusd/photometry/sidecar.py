@@ -56,7 +56,16 @@ from typing import Any
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.photometry.lamp_types import LAMP_TYPES, LampType
 from hdrusd.photometry.light import Provenance
-from hdrusd.photometry.recipe_keys import GAMMA, KEYS, checked, fits, invalid, shown, unknown
+from hdrusd.photometry.recipe_keys import (
+    GAMMA,
+    KEYS,
+    STRENGTHS,
+    checked,
+    fits,
+    invalid,
+    shown,
+    unknown,
+)
 from hdrusd.photometry.scotopic_light import ILLUMINANTS
 from hdrusd.report import Kind, Report
 
@@ -214,8 +223,13 @@ def _read_section(sidecar: Sidecar, section: str, tables: Any, report: Report) -
     for number, table in enumerate(tables, start=1):
         place = SourceRef(sidecar.path, f"{section}[{number}]")
         values = checked(table, section, place, report)
-        if "match" in values or (section == "lamp" and "at" in values):
-            sidecar.rules.append(Rule(section, place, values))
+        lamp = section == "lamp"
+        if "match" not in values and not (lamp and "at" in values):
+            wanted = "places in at, or a node in match" if lamp else "a name or a pattern in match"
+            invalid(report, place, "", f"nothing that it is for; want {wanted}")
+        elif lamp and not STRENGTHS & values.keys():
+            # No database says how strong it is, so there is nothing to estimate from.
+            wanted = ", ".join(sorted(STRENGTHS))
+            invalid(report, place, "", f"no strength; not placed; want one of {wanted}")
         else:
-            wanted = "at, places, or match" if section == "lamp" else "a name or a pattern"
-            invalid(report, place, "", f"no match; want {wanted}")
+            sidecar.rules.append(Rule(section, place, values))
