@@ -382,3 +382,31 @@ def test_what_is_no_light_in_closed_form_is_kept(tmp_path: Path) -> None:
     assert result.report.codes() == {"usd-light-kept", "validation"}
     layer = Sdf.Layer.FindOrOpen(str(result.output.with_suffix(".photometry.usda")))
     assert not layer.rootPrims
+
+
+def test_lamps_of_an_instancer_are_counted(tmp_path: Path) -> None:
+    bulb = lamp("SphereLight", "float inputs:intensity = 100\nfloat inputs:radius = 0.1", "Bulb")
+    other = lamp("SphereLight", "float inputs:intensity = 1\nfloat inputs:radius = 0.1", "Other")
+    string = f"""def PointInstancer "String"
+{{
+    rel prototypes = [</World/String/A>, </World/String/B>]
+    int[] protoIndices = [0, 1, 0, 0]
+    point3f[] positions = [(0, 0, 1), (1, 0, 1), (2, 0, 1), (3, 0, 1)]
+    def Xform "A"
+    {{
+        {bulb}
+    }}
+    def Xform "B"
+    {{
+        {other}
+    }}
+}}"""
+    first = run(stage_file(tmp_path / "a.usda", string), tmp_path / "b.usda")
+    second = run(first.output, tmp_path / "again" / "c.usda")
+    for result in (first, second):
+        rows = {row["name"]: row for row in result.lights}
+        assert (rows["Bulb"]["lamps"], rows["Other"]["lamps"]) == (3, 1)
+        # I = L pi r^2 and Phi = 4 pi I of each.
+        assert rows["Bulb"]["flux_lm"] == pytest.approx(
+            4 * math.pi * 100 * math.pi * 0.01, rel=1e-5
+        )

@@ -86,7 +86,8 @@ class LightOverlay:
         if light_overs.is_photometric(prim):
             self._photometric += 1
             made = light.read_light(prim)
-            self.rows.append(light_row(prim.GetName(), str(prim.GetPath()), made))
+            row = light_row(prim.GetName(), str(prim.GetPath()), made)
+            self.rows.append(row | {"lamps": sum(map(light_overs.copies, places))})
             return
         source = read_source_light(prim, places)
         if source is None or not source.sound:
@@ -304,7 +305,7 @@ class LightOverlay:
             place=str(SourceRef(self.file, str(prim.GetPath()))),
             file_flux=flux,
         )
-        row["lamps"] = len(places)
+        row["lamps"] = sum(map(light_overs.copies, places))
         if source.kind in _FLUX and not made.profile:
             per_nit = source.brightest.per_nit
             row["luminance_cd_m2"] = made.intensity / per_nit if per_nit > 0.0 else None

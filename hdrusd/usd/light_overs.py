@@ -111,6 +111,20 @@ def light_places(stage: Usd.Stage) -> dict[Sdf.Path, list[Usd.Prim]]:
     return places
 
 
+def copies(prim: Usd.Prim) -> int:
+    """How often the point instancers above a light show it; 1 where there are none."""
+    count, above = 1, prim.GetParent()
+    while above and not above.IsPseudoRoot():
+        if above.IsA(UsdGeom.PointInstancer):
+            instancer = UsdGeom.PointInstancer(above)
+            targets = instancer.GetPrototypesRel().GetForwardedTargets()
+            mine = [i for i, path in enumerate(targets) if prim.GetPath().HasPrefix(path)]
+            indices = instancer.GetProtoIndicesAttr().Get(Usd.TimeCode.EarliestTime())
+            count *= int(np.isin(np.asarray(indices or []), mine).sum())
+        above = above.GetParent()
+    return count
+
+
 def is_photometric(prim: Usd.Prim) -> bool:
     """Whether a light has our schema already, and says where its number comes from."""
     stated = prim.GetAttribute("photometric:provenance")
