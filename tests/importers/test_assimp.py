@@ -247,7 +247,7 @@ def test_a_real_file(testdata: Path) -> None:
     assert list(counts.values()) == [1, 17664, 1, 1, 1]
     texture = scene.materials[0].diffuse_map
     assert texture is not None
-    assert texture.image.path == file.with_name("earthSpherical.jpg")
+    assert texture.image.path == file.resolve().with_name("earthSpherical.jpg")
 
 
 @needs_assimp

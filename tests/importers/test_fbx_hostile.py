@@ -128,10 +128,14 @@ def test_weights_of_points_that_are_not_there(tmp_path: Path) -> None:
     body = array("Indexes", [0, 1, 5000, -1]), array("Weights", [1.0, float(0), 1.0, 1.0])
     cluster = fbx.add("Deformer", "", "Cluster", "Version: 100", *body, under=skin)
     fbx.connect(bone, cluster)
-    scene, _ = load(fbx.write(tmp_path))
-    weights = scene.meshes[0].joint_weights
+    scene, report = load(fbx.write(tmp_path))
+    weights, joints = scene.meshes[0].joint_weights, scene.meshes[0].joint_indices
     assert weights is not None
-    assert weights.sum(axis=1).tolist() == [1.0, 0.0, 0.0, 0.0]
+    assert joints is not None
+    # A point without a weight would be drawn at the origin: it goes with the first joint.
+    assert weights.sum(axis=1).tolist() == [1.0, 1.0, 1.0, 1.0]
+    assert joints[1:, 0].tolist() == [0, 0, 0]
+    assert "skin-weights" in report.codes()
 
 
 @needs_data
