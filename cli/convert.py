@@ -11,7 +11,16 @@ import click
 from hdrusd.errors import HdrusdError
 from hdrusd.photometry.estimate import DEFAULT_RULE, RULES
 
-from .options import FILE, FOLDER, NumberRange, finish, report_options, tell, write_report
+from .options import (
+    FILE,
+    NumberRange,
+    finish,
+    measure_options,
+    report_options,
+    root_options,
+    tell,
+    write_report,
+)
 
 
 @click.command("convert")
@@ -39,31 +48,8 @@ from .options import FILE, FOLDER, NumberRange, finish, report_options, tell, wr
     show_default=True,
     help="Unit of the stage.",
 )
-@click.option(
-    "--source-unit",
-    type=NumberRange(1e-9, 1e9),
-    metavar="METERS",
-    help="Metres a source unit, where the format does not say or is wrong.",
-)
-@click.option(
-    "--up",
-    type=click.Choice(["Y", "Z"]),
-    help="Up axis of the source, where the format does not say or is wrong.",
-)
-@click.option(
-    "--root",
-    "roots",
-    type=FOLDER,
-    multiple=True,
-    help="Folder below which the source may name files; its own always counts.",
-)
-@click.option(
-    "--search-path",
-    "search",
-    type=FOLDER,
-    multiple=True,
-    help="Folder where missing textures are looked for.",
-)
+@measure_options
+@root_options
 @report_options
 def command(
     source: Path,

@@ -7,25 +7,12 @@ from pathlib import Path
 
 import click
 
-from .options import FILE, FOLDER, tell
+from .options import FILE, root_options, tell
 
 
 @click.command("inspect")
 @click.argument("source", type=FILE)
-@click.option(
-    "--root",
-    "roots",
-    type=FOLDER,
-    multiple=True,
-    help="Folder below which the source may name files; its own always counts.",
-)
-@click.option(
-    "--search-path",
-    "search",
-    type=FOLDER,
-    multiple=True,
-    help="Folder where missing textures are looked for.",
-)
+@root_options
 @click.option("--json", "as_json", is_flag=True, help="Print all of it as one JSON object.")
 @click.option("-q", "--quiet", is_flag=True, help="No findings on the terminal.")
 def command(

@@ -91,6 +91,51 @@ def report_options(function: F) -> F:
     return function
 
 
+def root_options(function: F) -> F:
+    """--root, --search-path: where the files that a source names may lie."""
+    for option in reversed(
+        (
+            click.option(
+                "--root",
+                "roots",
+                type=FOLDER,
+                multiple=True,
+                help="Folder below which the source may name files; its own always counts.",
+            ),
+            click.option(
+                "--search-path",
+                "search",
+                type=FOLDER,
+                multiple=True,
+                help="Folder where missing textures are looked for.",
+            ),
+        )
+    ):
+        function = option(function)
+    return function
+
+
+def measure_options(function: F) -> F:
+    """--source-unit, --up: what a format leaves open."""
+    for option in reversed(
+        (
+            click.option(
+                "--source-unit",
+                type=NumberRange(1e-9, 1e9),
+                metavar="METERS",
+                help="Metres a source unit, where the format does not say or is wrong.",
+            ),
+            click.option(
+                "--up",
+                type=click.Choice(["Y", "Z"]),
+                help="Up axis of the source, where the format does not say or is wrong.",
+            ),
+        )
+    ):
+        function = option(function)
+    return function
+
+
 def operator_options(function: F) -> F:
     """--operator and --set name=value for its parameters."""
     for option in (

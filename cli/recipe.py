@@ -9,7 +9,7 @@ import click
 
 from hdrusd.errors import HdrusdError
 
-from .options import FILE, FOLDER, tell
+from .options import FILE, measure_options, root_options, tell
 
 
 @click.group("recipe")
@@ -20,31 +20,8 @@ def command() -> None:
 @command.command("init")
 @click.argument("source", type=FILE)
 @click.argument("output", type=click.Path(path_type=Path, allow_dash=True), required=False)
-@click.option(
-    "--root",
-    "roots",
-    type=FOLDER,
-    multiple=True,
-    help="Folder below which the source may name files; its own always counts.",
-)
-@click.option(
-    "--search-path",
-    "search",
-    type=FOLDER,
-    multiple=True,
-    help="Folder where missing textures are looked for.",
-)
-@click.option(
-    "--source-unit",
-    type=click.FloatRange(1e-9, 1e9),
-    metavar="METERS",
-    help="Metres a source unit, where the format does not say or is wrong.",
-)
-@click.option(
-    "--up",
-    type=click.Choice(["Y", "Z"]),
-    help="Up axis of the source, where the format does not say or is wrong.",
-)
+@measure_options
+@root_options
 @click.option("--overwrite", is_flag=True, help="Replace OUTPUT where it exists.")
 @click.option("-q", "--quiet", is_flag=True, help="No findings on the terminal.")
 def init(

@@ -310,3 +310,10 @@ def test_a_picture_is_looked_at_once() -> None:
     asked: list[str] = []
     leads(one_square(materials=shared), lambda image: asked.append(image.name))
     assert asked == ["wall.png"]
+
+
+def test_a_unit_is_a_number(tmp_path: Path) -> None:
+    source = obj(tmp_path / "a.obj", "Kd 1 1 1")
+    done = init(str(source), "-", "--source-unit", "nan")
+    assert done.exit_code == 2
+    assert "nan is no number" in done.stderr
