@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import json
 import shutil
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from hdrusd.errors import HdrusdError
+from hdrusd.errors import HdrusdError, InputError
 from hdrusd.photometry.estimate import DEFAULT_RULE, RULES
 
 from .options import (
     FILE,
+    PLACE,
+    STRICT,
     NumberRange,
     finish,
     measure_options,
@@ -22,11 +29,18 @@ from .options import (
     write_report,
 )
 
+if TYPE_CHECKING:
+    from hdrusd.conversion import Options
+
 
 @click.command("convert")
-@click.argument("source", type=FILE)
-@click.argument("output", type=FILE)
-@click.option("--photometry", type=FILE, help="Photometry file. [default: photometry.toml beside]")
+@click.argument("sources", metavar="SOURCE...", nargs=-1, type=PLACE)
+@click.argument("output", type=PLACE)
+@click.option(
+    "--photometry",
+    type=FILE,
+    help="Photometry file. [default: photometry.toml beside, or nearest above in a folder SOURCE]",
+)
 @click.option(
     "--estimate",
     metavar="RULE",
@@ -50,9 +64,15 @@ from .options import (
 )
 @measure_options
 @root_options
+@click.option(
+    "-j",
+    "--jobs",
+    type=click.IntRange(1, 64),
+    help="Files converted at once, of several. [default: one a core]",
+)
 @report_options
 def command(
-    source: Path,
+    sources: tuple[Path, ...],
     output: Path,
     photometry: Path | None,
     estimate: str,
@@ -62,26 +82,28 @@ def command(
     up: str | None,
     roots: tuple[Path, ...],
     search: tuple[Path, ...],
+    jobs: int | None,
     report_file: Path | None,
     strict: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Turn SOURCE into a photometric stage OUTPUT.usda.
+    """Turn SOURCE into a photometric stage OUTPUT.usda, or many into stages below a folder.
 
     SOURCE: a database (.3ds .ac .b3d .dae .fbx .flt .glb .gltf .ive .kmz .lwo .ms3d .obj .off
     .osg .osgb .osgt .ply .stl .x .zae), or a stage (.usd .usda .usdc .usdz). Beside OUTPUT stand
     its layers (geometry, look, photometry) and textures. A stage stays where it is and as it is;
     OUTPUT names it below a layer with its photometry, and may not replace it.
-    """
-    from hdrusd.account.text import summary
-    from hdrusd.conversion import Options
-    from hdrusd.convert import OUTPUT_SUFFIXES, convert
-    from hdrusd.report import Report
 
-    if output.suffix.lower() not in OUTPUT_SUFFIXES:
-        raise click.UsageError(f"{output}: want a name that ends in {' or '.join(OUTPUT_SUFFIXES)}")
-    report = Report()
+    Several sources, or a folder, which stands for every database below it, become the same tree
+    of stages below the folder OUTPUT. Each may name files anywhere in that folder; one that is
+    refused, or that kills its reader, does not stop the others.
+    """
+    if not sources:  # the one name that is there went to OUTPUT
+        raise click.UsageError("Missing argument 'OUTPUT'.")
+    from hdrusd.conversion import Options
+    from hdrusd.convert import OUTPUT_SUFFIXES
+
     options = Options(
         photometry=photometry,
         estimate=estimate,
@@ -92,27 +114,98 @@ def command(
         roots=roots,
         search=search,
     )
+    telling = Telling(report_file, strict=strict, as_json=as_json, quiet=quiet)
+    if len(sources) > 1 or sources[0].is_dir():
+        if output.is_file() or output.suffix.lower() in OUTPUT_SUFFIXES:
+            raise click.UsageError(f"{output}: want a folder for the stages of many sources")
+        _convert_many(sources, output, options, jobs, telling)
+        return
+    if jobs is not None:
+        raise click.UsageError("--jobs: want several sources, or a folder")
+    if output.suffix.lower() not in OUTPUT_SUFFIXES:
+        raise click.UsageError(f"{output}: want a name that ends in {' or '.join(OUTPUT_SUFFIXES)}")
+    _convert_one(sources[0], output, options, telling)
+
+
+class Telling(NamedTuple):
+    """Where the account goes."""
+
+    report_file: Path | None
+    strict: bool
+    as_json: bool
+    quiet: bool
+
+    def account(self, document: dict[str, Any], lines: Callable[[int], list[str]]) -> None:
+        """The report, the summary and the JSON object."""
+        if not self.quiet:
+            for line in lines(shutil.get_terminal_size((100, 24)).columns):
+                click.echo(line, err=True)
+        if self.as_json:
+            click.echo(json.dumps(document))
+
+
+def _convert_one(source: Path, output: Path, options: Options, telling: Telling) -> None:
+    from hdrusd.account.text import summary
+    from hdrusd.convert import convert
+    from hdrusd.report import Report
+
+    report = Report()
     try:
         result = convert(source, output, options, report)
     except HdrusdError:
-        tell(report, quiet)  # what led to it
-        if report_file is not None:
-            write_report(report_file, report.as_dict())
+        tell(report, telling.quiet)  # what led to it
+        if telling.report_file is not None:
+            write_report(telling.report_file, report.as_dict())
         raise
     document = result.as_dict()
-    if report_file is not None:
-        write_report(report_file, document)
-    tell(report, quiet)
-    if not quiet:
-        for line in summary(document, shutil.get_terminal_size((100, 24)).columns):
-            click.echo(line, err=True)
-    if as_json:
-        click.echo(json.dumps(document))
-    else:
-        counts = result.counts
-        click.echo(
-            f"{output}: {counts['triangles']} triangles, {counts['materials']} materials, "
-            f"{len(result.textures)} textures, "
-            f"{sum(row['lamps'] for row in result.lights)} lights"
-        )
-    finish(report, strict)
+    if telling.report_file is not None:
+        write_report(telling.report_file, document)
+    tell(report, telling.quiet)
+    telling.account(document, partial(summary, document))
+    if not telling.as_json:
+        click.echo(_line(output, document))
+    finish(report, telling.strict)
+
+
+def _convert_many(
+    sources: tuple[Path, ...], output: Path, options: Options, jobs: int | None, telling: Telling
+) -> None:
+    from hdrusd.account.many import batch_document
+    from hdrusd.account.text import batch_summary
+    from hdrusd.batch.plan import plan
+    from hdrusd.batch.workers import convert_all
+    from hdrusd.map_threads import CORES
+
+    tasks = plan(sources, output, options.photometry)
+    rows = []
+    with closing(convert_all(tasks, options, jobs or CORES)) as run:
+        for row in run:
+            rows.append(row)
+            if row.code:
+                click.echo(_refusal(row.source, row.error), err=True)
+            elif not telling.as_json:
+                click.echo(_line(row.output, row.document))
+    document = batch_document(rows)
+    if telling.report_file is not None:
+        write_report(telling.report_file, document)
+    telling.account(document, partial(batch_summary, document))
+    if any(row.code for row in rows):
+        sys.exit(InputError.exit_code)
+    if telling.strict and document["findings_by_code"]:
+        sys.exit(STRICT)
+
+
+def _refusal(source: Path, error: str) -> str:
+    """With the whole path: many folders may have a file of that name."""
+    name = source.name
+    return f"{source}{error.removeprefix(name)}" if error.startswith(name) else f"{source}: {error}"
+
+
+def _line(output: Path, document: Mapping[str, Any]) -> str:
+    from hdrusd.account.text import lights_and_skies
+
+    counts, textures = document["counts"], len(document["textures"])
+    return (
+        f"{output}: {counts['triangles']} triangles, {counts['materials']} materials, "
+        f"{textures} textures, lights: {lights_and_skies(document['totals'])}"
+    )

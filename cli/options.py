@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 import sys
 import tempfile
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from hdrusd.errors import HdrusdError
-from hdrusd.report import Report
+from hdrusd.report import Finding, Report
 
 if TYPE_CHECKING:
     from hdrusd.tonemap.operator import Operator
@@ -25,11 +24,14 @@ F = TypeVar("F", bound=Callable[..., Any])
 #: Exit code of a run with findings under --strict.
 STRICT = 6
 
-#: Findings told on the terminal; the rest is in the report.
+#: Findings told on the terminal, those with the same words once; the rest is in the report.
 _SHOWN = 20
 
-FILE = click.Path(path_type=Path, dir_okay=False)
+#: Whoever reads the file says that it cannot be read, with the exit code for that.
+FILE = click.Path(path_type=Path, dir_okay=False, readable=False)
 FOLDER = click.Path(path_type=Path, file_okay=False, exists=True)
+#: A file or a folder.
+PLACE = click.Path(path_type=Path, readable=False)
 
 
 class NumberRange(click.FloatRange):
@@ -184,29 +186,35 @@ def chosen_operator(name: str | None, settings: dict[str, Any]) -> Operator:
 
 
 def tell(report: Report, quiet: bool) -> None:
-    """Findings to standard error: guesses and losses first, a line each, the count last."""
+    """Findings to standard error: guesses and losses first, the same words once, the count last."""
     if quiet or not len(report):
         return
     order = ["missing", "invalid", "clamped", "guessed", "dropped", "replaced", "assumed"]
     findings = sorted(report, key=lambda finding: order.index(str(finding.kind)))
-    for finding in findings[:_SHOWN]:
-        click.echo(f"{finding.kind}: {finding}", err=True)
-    if len(findings) > _SHOWN:
-        click.echo(f"... and {len(findings) - _SHOWN} more; --report FILE has them all", err=True)
+    alike: dict[tuple[str, str, str], list[Finding]] = {}
+    for finding in findings:
+        alike.setdefault((finding.kind, finding.code, finding.text), []).append(finding)
+    groups = list(alike.values())
+    for group in groups[:_SHOWN]:
+        more = f"; {len(group) - 1} more like this" if len(group) > 1 else ""
+        click.echo(f"{group[0].kind}: {group[0]}{more}", err=True)
+    if len(groups) > _SHOWN:
+        left = sum(map(len, groups[_SHOWN:]))
+        click.echo(f"... and {left} more; --report FILE has them all", err=True)
     click.echo(report.summary(), err=True)
 
 
 def write_report(path: Path, document: dict[str, Any]) -> None:
-    """Write JSON under a temporary name, then rename. Raises HdrusdError for what is no report."""
+    """Write JSON, all of it or nothing. Raises HdrusdError for what is no report, OSError."""
+    from hdrusd.images import write_atomically
+
     _spare(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        temporary.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+    text = json.dumps(document, indent=1) + "\n"
+
+    def write(temporary: Path) -> None:
+        temporary.write_text(text, encoding="utf-8")
+
+    write_atomically(path, write)
 
 
 def finish(report: Report, strict: bool) -> None:

@@ -88,7 +88,7 @@ def _check_places(file: Path, output: Path | None, plot: Path | None) -> None:
     if plot is not None:
         if plot.suffix.lower() != ".png":
             raise click.UsageError(f"--plot {plot}: want a name that ends in .png")
-        from hdrusd.adaptation_log import check_plot
+        from hdrusd.plots import check_plot
 
         check_plot()
     if output is not None and output.exists() and file.exists() and output.samefile(file):
@@ -96,17 +96,13 @@ def _check_places(file: Path, output: Path | None, plot: Path | None) -> None:
 
 
 def _read(path: Path) -> bytes:
-    """The bytes of a file; InputError for a pipe or a device, and for one too large."""
-    from hdrusd.errors import InputError
+    """The bytes of a file, one too many of one too large. Raises InputError."""
+    from hdrusd.input_file import check_input
     from hdrusd.photometry.luminaire import MOST_BYTES
 
-    if path.exists() and not path.is_file():
-        raise InputError(path, "not a regular file")
-    try:
-        with path.open("rb") as stream:
-            return stream.read(MOST_BYTES + 1)
-    except OSError as problem:
-        raise InputError(path, f"{problem.strerror or problem}; want a file to read") from None
+    check_input(path)
+    with path.open("rb") as stream:
+        return stream.read(MOST_BYTES + 1)
 
 
 def _examined(file: Path, report: Report) -> Examined:

@@ -80,6 +80,8 @@ def command(source: str, output: str, **options: Any) -> None:
         raise click.UsageError(f"--fps {options['fps']}: want a number")
     if Path(output).suffix.lower() != ".png":
         raise click.UsageError(f"{output}: want a name that ends in .png")
+    if Path(source).is_dir():
+        raise click.UsageError(f"'{source}' is a directory; want frames, like night.####.exr")
     if options["frames"] is not None:
         times = parse_frames(options["frames"])
         check_pattern(source, times)

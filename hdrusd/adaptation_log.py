@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hdrusd.errors import HdrusdError, InputError, SourceRef
+from hdrusd.errors import InputError, SourceRef
 from hdrusd.images import write_atomically
+from hdrusd.plots import COLOURS, write_plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,25 +38,8 @@ _QUANTITIES = {
     "": ("Share", False),
 }
 
-#: M. Okabe, K. Ito, "Color Universal Design", 2008: told apart by colour-blind readers too.
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-
 #: Thresholds are broken lines, so that they are not taken for what is seen.
 _DASHES = ((0, (4, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)))
-
-_STYLE = {
-    "font.family": "DejaVu Sans",  # comes with matplotlib
-    "font.size": 9.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.linewidth": 0.8,
-    "axes.axisbelow": True,
-    "axes.grid": True,
-    "grid.color": "#d8d8d8",
-    "grid.linewidth": 0.5,
-    "legend.frameon": False,
-    "savefig.dpi": 150,
-}
 
 
 @dataclass(slots=True)
@@ -114,15 +98,9 @@ class AdaptationLog:
 
     def write_plot(self, path: Path, title: str = "") -> None:
         """The numbers over time as a PNG, a panel for each unit. Raises HdrusdError, OSError."""
-        check_plot()
-        import matplotlib
-
         panels = self._panels()
-        with matplotlib.rc_context():
-            matplotlib.rcdefaults()  # not the user's own style
-            matplotlib.rcParams.update(_STYLE)
-            figure = self._figure(panels, title)
-            write_atomically(path, lambda temporary: figure.savefig(temporary, format="png"))
+        style = {"axes.spines.top": False, "axes.spines.right": False}
+        write_plot(path, lambda: self._figure(panels, title), style)
 
     def _panels(self) -> dict[str, list[str]]:
         """Columns by unit; those without a number that can be drawn are left out."""
@@ -170,7 +148,7 @@ class AdaptationLog:
             broken = "threshold" in name
             count = drawn[broken]
             drawn[broken] += 1
-            colours = _COLOURS[::-1] if broken else _COLOURS
+            colours = COLOURS[::-1] if broken else COLOURS
             line = _DASHES[count % len(_DASHES)] if broken else "-"
             panel.plot(
                 time,
@@ -190,13 +168,3 @@ def split(column: str) -> tuple[str, str]:
     """Name and unit of a column, "" for a plain number."""
     match = _NAME.fullmatch(column)
     return (match["name"], match["unit"] or "") if match else (column, "")
-
-
-def check_plot() -> None:
-    """Raise HdrusdError where matplotlib is missing, before an hour's work rather than after."""
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        raise HdrusdError(
-            "plot: matplotlib is not installed; want pip install 'hdrusd[plot]'"
-        ) from None

@@ -7,20 +7,37 @@ units) or nodes (``match``, with ``offset`` in their own space), and says all th
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
 from hdrusd.errors import SourceRef
 from hdrusd.legacy.scene import TRS, LegacyScene, Light, Node, Vec3
 from hdrusd.photometry.sidecar import Rule, Sidecar
+from hdrusd.photometry.spread import SHAPES
+from hdrusd.report import Kind, Report
+from hdrusd.usd.transform import first_matrix
 
 #: Half-angle of a lamp without one: it shines everywhere.
 _EVERYWHERE = 180.0
 
+#: Degrees off straight down that are told.
+_OFF = 1.0
 
-def add_lamps(scene: LegacyScene, sidecar: Sidecar, up: str) -> dict[int, Rule]:
+#: Places of nodes that are looked at; what hangs in ever more places is a bomb.
+_MOST = 100_000
+
+
+def add_lamps(scene: LegacyScene, sidecar: Sidecar, up: str, report: Report) -> dict[int, Rule]:
     """Hang the lamps into ``scene``; the rule of each new light by its index.
 
     ``up``: "Y" or "Z", against which lamps without an axis shine.
     """
     rules: dict[int, Rule] = {}
+    aimed: dict[int, list[Rule]] = {}  # by the ids of their nodes, which may be turned
     nodes = _nodes(scene)  # before any is added
     for rule in sidecar.rules:
         if rule.section != "lamp":
@@ -39,22 +56,58 @@ def add_lamps(scene: LegacyScene, sidecar: Sidecar, up: str) -> dict[int, Rule]:
                 if rule.fits((node.name,)):
                     node.lights.append(index)
                     rule.matched = True
+                    if "axis" not in rule.values and _has_a_way(rule):
+                        aimed.setdefault(id(node), []).append(rule)
+    if aimed:
+        _note_turned(scene, aimed, np.array(_down(up)), report)
     return rules
+
+
+def _has_a_way(rule: Rule) -> bool:
+    """Whether it matters where the lamp points."""
+    shaped = rule.values.get("spread", "sphere") in SHAPES
+    return shaped or "cutoff" in rule.values or "ies" in rule.values
+
+
+def _note_turned(
+    scene: LegacyScene, aimed: Mapping[int, list[Rule]], down: npt.NDArray[Any], report: Report
+) -> None:
+    """A finding for lamps whose node is turned: down is that of the node."""
+    stack = [(node, np.eye(3)) for node in scene.roots]
+    for _ in range(_MOST):
+        if not stack:
+            return
+        node, above = stack.pop()
+        world = first_matrix(node)[:3, :3] @ above
+        way = down @ world
+        length = float(np.linalg.norm(way))
+        cosine = float(way @ down) / length if length > 0.0 else 1.0
+        off = math.degrees(math.acos(min(max(cosine, -1.0), 1.0)))
+        for rule in aimed.get(id(node), ()) if off > _OFF else ():
+            text = (
+                f"points {off:.3g} degrees off straight down, as its node {node.name} is turned; "
+            )
+            text += "axis says otherwise"
+            report.add(Kind.ASSUMED, "light-aim", rule.place, _name(rule), text)
+        stack.extend((child, world) for child in node.children)
 
 
 def _name(rule: Rule) -> str:
     return str(rule.values.get("name", "Lamp"))
 
 
+def _down(up: str) -> Vec3:
+    return (0.0, -1.0, 0.0) if up == "Y" else (0.0, 0.0, -1.0)
+
+
 def _light(rule: Rule, up: str) -> Light:
     cutoff = rule.number("cutoff")
-    down: Vec3 = (0.0, -1.0, 0.0) if up == "Y" else (0.0, 0.0, -1.0)
     return Light(
         _name(rule),
         SourceRef(rule.place.file, rule.place.place),
         "point" if cutoff is None else "spot",
         position=(rule.three("offset") or (0.0, 0.0, 0.0)) if "match" in rule.values else (0, 0, 0),
-        direction=rule.three("axis") or down,
+        direction=rule.three("axis") or _down(up),
         spot_cutoff=_EVERYWHERE if cutoff is None else cutoff,
     )
 

@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from hdrusd.adaptation_log import AdaptationLog, check_plot
+from hdrusd.adaptation_log import AdaptationLog
 from hdrusd.colour import from_rec2020, luminance
 from hdrusd.course import EVERY
 from hdrusd.errors import ParameterError
 from hdrusd.eye.screen import Screen
 from hdrusd.images import read_image
+from hdrusd.plots import check_plot
 from hdrusd.tonemap.operator import Moment, Operator
 from hdrusd.video import VideoWriter
 from hdrusd.viewing import decoded

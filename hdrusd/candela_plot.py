@@ -13,31 +13,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hdrusd.adaptation_log import check_plot
-from hdrusd.images import write_atomically
 from hdrusd.photometry.distribution import Section, fan, peak, sections
 from hdrusd.photometry.luminaire import Luminaire
+from hdrusd.plots import COLOURS, write_plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.projections.polar import PolarAxes
 
-#: M. Okabe, K. Ito, "Color Universal Design", 2008: told apart by colour-blind readers too.
-_COLOURS = ("#0072B2", "#D55E00")
 _DASHES = ("-", (0, (5, 2)))
-
-_STYLE = {
-    "font.family": "DejaVu Sans",  # comes with matplotlib
-    "font.size": 9.0,
-    "axes.linewidth": 0.8,
-    "axes.axisbelow": True,
-    "axes.grid": True,
-    "grid.color": "#d8d8d8",
-    "grid.linewidth": 0.5,
-    "legend.frameon": False,
-    "savefig.dpi": 150,
-}
 
 #: Degrees between two points of a drawn curve: lines of a polar diagram are curved.
 _STEP = 0.5
@@ -45,14 +30,7 @@ _STEP = 0.5
 
 def write_candela_plot(luminaire: Luminaire, path: Path) -> None:
     """Draw the two ``sections`` of a luminaire. Raises HdrusdError, OSError."""
-    check_plot()
-    import matplotlib
-
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()  # not the user's own style
-        matplotlib.rcParams.update(_STYLE)
-        figure = _figure(luminaire)
-        write_atomically(path, lambda temporary: figure.savefig(temporary, format="png"))
+    write_plot(path, lambda: _figure(luminaire))
 
 
 def _figure(luminaire: Luminaire) -> Figure:
@@ -95,7 +73,7 @@ def _draw_polar(panel: PolarAxes, drawn: Sequence[Section], nadir: bool, unit: s
 
     panel.set_theta_zero_location("S" if nadir else "N")
     panel.set_theta_direction(1 if nadir else -1)
-    for section, colour, dashes in zip(drawn, _COLOURS, _DASHES, strict=True):
+    for section, colour, dashes in zip(drawn, COLOURS[:2], _DASHES, strict=True):
         panel.plot(
             np.radians(section.angles),
             section.candela,
@@ -126,7 +104,7 @@ def _darkest(drawn: Sequence[Section]) -> float:
 
 
 def _draw_plain(panel: Axes, drawn: Sequence[Section], nadir: bool, unit: str) -> None:
-    for section, colour, dashes in zip(drawn, _COLOURS, _DASHES, strict=True):
+    for section, colour, dashes in zip(drawn, COLOURS[:2], _DASHES, strict=True):
         beam = fan(section, 0.5)
         note = "dark" if beam is None else f"beam angle {beam:.4g}°"
         panel.plot(

@@ -11,6 +11,7 @@ from hdrusd.account.fix_first import Scene, fix_first
 from hdrusd.account.totals import totals
 from hdrusd.importers.importer import Limits
 from hdrusd.photometry.estimate import DEFAULT_RULE
+from hdrusd.photometry.sidecar import Sidecar, Unmatched
 from hdrusd.report import Report
 
 
@@ -19,6 +20,7 @@ class Options:
     """How to convert. ``gamma`` None: the photometry file's, else 2.2."""
 
     photometry: Path | None = None
+    shared: bool = False  # the photometry file: a pattern of it may be meant for another source
     estimate: str = DEFAULT_RULE
     gamma: float | None = None
     meters_per_unit: float = 1.0
@@ -44,6 +46,13 @@ class Result:
     ground: float = 0.0  # m2 below its bounding box
     unit_stated: bool = False  # by whoever asked for the conversion
     source: Path | None = None
+    unmatched: list[Unmatched] = field(default_factory=list)
+
+    def note_unmatched(self, sidecar: Sidecar, options: Options) -> None:
+        """What of the photometry file fits nothing: for the report, or for whoever shares it."""
+        self.unmatched = sidecar.unmatched()
+        for pattern in () if options.shared else self.unmatched:
+            pattern.note(self.report)
 
     def as_dict(self) -> dict[str, Any]:
         """JSON form: docs/report.md."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -19,6 +19,7 @@ from hdrusd.delivery import check_output, check_path, move_into_place, work_fold
 from hdrusd.errors import InputError, SourceRef, ValidationError
 from hdrusd.importers.importer import Resolver
 from hdrusd.importers.importer import read as read_legacy
+from hdrusd.input_file import check_input
 from hdrusd.lamps import LampMaker, temperature_rgb
 from hdrusd.legacy import scene as legacy
 from hdrusd.luminaires import LuminaireFiles
@@ -34,11 +35,11 @@ from hdrusd.surfaces import SurfaceMaker, colored_materials, material_rows
 from hdrusd.usd.authorship import authorship_inputs, write_authorship
 from hdrusd.usd.material import Surface, write_look, write_photometric
 from hdrusd.usd.mesh import COLOR_PRIMVAR
-from hdrusd.usd.placed import area_scales, footprint
+from hdrusd.usd.placed import area_scales, extents
 from hdrusd.usd.settings import Settings
 from hdrusd.usd.source_stage import STAGES
 from hdrusd.usd.tree import Place
-from hdrusd.usd.worn_area import lamp_area
+from hdrusd.usd.worn_area import LampAreas
 from hdrusd.usd.writer import StageWriter
 from hdrusd.validation import validate
 
@@ -53,8 +54,7 @@ def convert(source: Path, output: Path, options: Options, report: Report | None 
     """Convert one file. Raises InputError, ValidationError; ``output`` is whole or untouched."""
     report = Report() if report is None else report
     check_output(output, OUTPUT_SUFFIXES)
-    if not source.is_file():
-        raise InputError(source, "no such file")
+    check_input(source)
     # OUTPUT names a stage with its folders, a database by its name.
     check_path(source.absolute() if source.suffix.lower() in STAGES else Path(source.name))
     with work_folder(output) as folder:
@@ -82,7 +82,7 @@ class _Conversion:
         self.scene = read_legacy(resolver, report)
         self.result = Result(output, report, self.scene.counts(), source=source)
         up = options.up or self.scene.up
-        self.added = add_lamps(self.scene, self.sidecar, up)
+        self.added = add_lamps(self.scene, self.sidecar, up, report)
         stem = output.stem
         files = folder / f"{stem}.textures", f"./{stem}.textures"
         self.maps = MapWriter(*files, report)
@@ -114,8 +114,9 @@ class _Conversion:
             temperature_rgb,
             self.report,
         )
-        pictures = (m.diffuse_map.image for m in self.scene.materials if m.diffuse_map)
-        with self.maps.threaded(pictures):
+        read = ("diffuse_map", "specular_map", *legacy.DATA_MAPS)  # by SurfaceMaker, in this order
+        maps = (material.maps() for material in self.scene.materials)
+        with self.maps.threaded(m[name].image for m in maps for name in read if name in m):
             self._write_materials(interpreter)
         lamps = LampMaker(
             self.scene,
@@ -138,7 +139,7 @@ class _Conversion:
         self.writer.write_settings(
             Settings(camera=camera, resolution=_RESOLUTION, operator="reinhard02")
         )
-        self.sidecar.note_unmatched(self.report)
+        self.result.note_unmatched(self.sidecar, self.options)
         inputs = authorship_inputs(self.scene.source, self.sidecar.path)
         write_authorship(self.writer.layers["photometry"], self.writer.root, inputs)
         self.writer.save()
@@ -176,17 +177,30 @@ class _Conversion:
         self.writer.edit_materials("photometry", photometric)
         self.result.materials = material_rows(materials, self.writer.materials, surfaces)
 
-    def _lamp_area(self, material: int) -> LampArea | None:
+    @cached_property
+    def _wearers(self) -> dict[int | None, list[int]]:
+        return wearers(self.scene)
+
+    @cached_property
+    def _lamp_areas(self) -> LampAreas:
         writer = self.writer
-        return lamp_area(writer.stage, self.scene, writer.meshes, writer.tree.copies, material)
+        placed = writer.meshes, writer.tree.copies
+        return LampAreas(writer.stage, self.scene, *placed, self._wearers)
+
+    @cached_property
+    def _scales(self) -> dict[int, float]:
+        """Of the meshes before the photometry file shows and hides nodes."""
+        writer = self.writer
+        return area_scales(writer.stage, writer.meshes, writer.tree.copies)
+
+    def _lamp_area(self, material: int) -> LampArea | None:
+        return self._lamp_areas.of(material)
 
     def _lamp_places(self, material: int, texture: legacy.Texture) -> npt.NDArray[Any] | None:
         materials = list(self.scene.materials)
         materials[material] = replace(materials[material], diffuse_map=texture)
-        writer = self.writer
-        scales = area_scales(writer.stage, writer.meshes, writer.tree.copies)
         scene = replace(self.scene, materials=materials)
-        return worn(scene, scales, material, wearers(scene).get(material, ())).uv
+        return worn(scene, self._scales, material, self._wearers.get(material, ())).uv
 
     # -- cameras, nodes, checks ------------------------------------------------------------
 
@@ -212,16 +226,15 @@ class _Conversion:
         """What a person needs to judge the result: areas, reflectances, textures by class."""
         result, stage = self.result, self.writer.stage
         result.textures = self.maps.written | self.luminaires.written | self.skies.written
-        result.diagonal, result.ground = self.writer.diagonal(), footprint(stage)
+        result.diagonal, result.ground = extents(stage)
         result.unit_stated = self.options.source_unit is not None
         scales = area_scales(stage, self.writer.meshes, self.writer.tree.copies)
-        meshes = wearers(self.scene)
         judge = Reflectances(self.maps.overview, self.report)
         pairs = zip(self.scene.materials, self.surfaces, result.materials, strict=True)
         for index, (material, surface, row) in enumerate(pairs):
             file = surface.diffuse_map.file.rpartition("/")[2] if surface.diffuse_map else ""
             factor = cast("list[float] | None", self.maps.written.get(file, {}).get("diffuse"))
-            found = worn(self.scene, scales, index, meshes.get(index, ()))
+            found = worn(self.scene, scales, index, self._wearers.get(index, ()))
             row |= judge.row(material, surface, found, factor)
         areas = [row["area_m2"] for row in result.materials]
         result.images = image_rows(self.scene.materials, self.surfaces, areas, result.textures)

@@ -18,6 +18,7 @@ import numpy as np
 
 from hdrusd.errors import InputError, ParameterError, SourceRef
 from hdrusd.images import read_exr_header, write_atomically
+from hdrusd.input_file import check_input
 from hdrusd.report import Kind, Report
 from hdrusd.tonemap.operator import Moment, Operator, State, statistics
 
@@ -266,8 +267,7 @@ def _plain(value: Any) -> Any:
 
 
 def _document(path: Path) -> Mapping[str, Any]:
-    if not path.is_file():
-        raise InputError(path, "no such file")
+    check_input(path)
     if path.stat().st_size > _LARGEST:
         raise InputError(path, f"{path.stat().st_size} bytes; want the states of a sequence")
     try:

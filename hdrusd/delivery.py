@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import errno
-import tempfile
 import unicodedata
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from hdrusd.errors import InputError
+from hdrusd.errors import InputError, OutputError
+from hdrusd.leftovers import left_behind, private_name, remove
+
+#: In a work folder: what stood in the places of what was made.
+_ASIDE = "replaced"
 
 #: Bytes in the name of a file, as common file systems have it.
 _LONGEST_NAME = 255
@@ -52,28 +55,54 @@ def work_folder(output: Path) -> Iterator[Path]:
         raise NotADirectoryError(errno.ENOTDIR, "not a folder; want one to write in", str(nearest))
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
-        with _beside(output) as folder:
-            try:
-                yield Path(folder)
-            except OSError as problem:
-                if problem.filename is None or str(problem.filename).startswith(folder):
-                    raise _refused(output, problem) from problem
-                raise
+        clear_leftovers(output, done=False)
+        folder = _beside(output)
+        try:
+            yield folder
+        except OSError as problem:
+            if problem.filename is None or str(problem.filename).startswith(str(folder)):
+                raise _refused(output, problem) from problem
+            raise
+        except OutputError as problem:
+            if problem.path.is_relative_to(folder):
+                raise OutputError(output, problem.reason) from problem
+            raise
+        finally:
+            remove(folder)
+        clear_leftovers(output, done=True)
     finally:
         for parent in made:
             with suppress(OSError):  # it is not there, or not empty
                 parent.rmdir()
 
 
-def _beside(output: Path) -> tempfile.TemporaryDirectory[str]:
+def _beside(output: Path) -> Path:
+    folder = output.parent.absolute() / private_name()
     try:
-        return tempfile.TemporaryDirectory(prefix=".hdrusd-", dir=output.parent.absolute())
+        folder.mkdir(mode=0o700)
     except OSError as problem:
         raise _refused(output, problem) from problem
+    return folder
+
+
+def clear_leftovers(output: Path, *, done: bool) -> None:
+    """Remove what dead processes left beside ``output``.
+
+    Who died between two renames has set an earlier stage aside; nobody else has it. It stays
+    until a run over that output is ``done`` and has replaced it.
+    """
+    parts = ("geometry.usdc", "look.usda", "photometry.usda", "textures")
+    own = {output.name, *(f"{output.stem}.{part}" for part in parts)}
+    for path in left_behind(output.parent):
+        aside = {each.name for each in (path / _ASIDE).glob("*")}
+        if not aside or (done and aside <= own):
+            remove(path)
 
 
 def _refused(output: Path, problem: OSError) -> OSError:
-    text = f"cannot be written ({problem.strerror or problem})"
+    text = str(problem.strerror or problem)
+    if not text.startswith("cannot be written"):
+        text = f"cannot be written ({text})"
     return OSError(problem.errno or errno.EIO, text, str(output))
 
 
@@ -83,7 +112,7 @@ def move_into_place(folder: Path, output: Path) -> None:
     What stood there before is set aside, and put back when a rename fails.
     """
     names = sorted((p.name for p in folder.iterdir()), key=lambda name: name == output.name)
-    old = folder / "replaced"
+    old = folder / _ASIDE
     old.mkdir()
     touched: list[str] = []
     try:

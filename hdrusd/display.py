@@ -12,7 +12,7 @@ import numpy as np
 
 from hdrusd.by_products import ByProducts, playback_rate
 from hdrusd.course import Checkpoints, Course, Cut, Known, Start, note_cuts
-from hdrusd.errors import InputError, SourceRef
+from hdrusd.errors import SourceRef
 from hdrusd.frame_header import (
     DEFAULT_FPS,
     Clock,
@@ -30,6 +30,7 @@ from hdrusd.gpu.context import create_context
 from hdrusd.gpu.ldr import deep
 from hdrusd.gpu.program import Programs
 from hdrusd.images import read_exr_header, write_png
+from hdrusd.input_file import check_input
 from hdrusd.report import Report
 from hdrusd.resuming import VIEWING, check_pictures, viewing_text
 from hdrusd.tonemap.operator import Moment
@@ -106,9 +107,8 @@ def tonemap_sequence(
     without a break. A file that does not say what its numbers are is taken as Rec. 709 in
     cd/m2, a finding. Raises InputError, ContextError.
     """
-    missing = next((source for _, source, _ in jobs if not source.is_file()), None)
-    if missing is not None:  # before anything of an earlier run is written anew
-        raise InputError(missing, "no such file")
+    for _, source, _ in jobs:  # before anything of an earlier run is written anew
+        check_input(source)
     place = SourceRef(jobs[0][1])
     note_glare(showing.viewing, place, report)
     note_cuts(showing.cuts, [frame for frame, _, _ in jobs], place, report)

@@ -2,6 +2,7 @@
 
     HdrusdError
         InputError                 a file says something we cannot use
+        OutputError                a file cannot be written, by the words of a library
         UnknownNameError           a name that is not in a registry
         ParameterError             an operator's parameter out of its range
         ShaderError                GLSL did not compile or link
@@ -59,6 +60,15 @@ class InputError(HdrusdError):
         self.source = source if isinstance(source, SourceRef) else SourceRef(source)
         self.problem = one_line(problem)
         super().__init__(f"{self.source}: {self.problem}")
+
+
+class OutputError(HdrusdError):
+    """A file that a library could not write; others are an OSError."""
+
+    def __init__(self, path: Path, reason: str) -> None:
+        self.path = path
+        self.reason = one_line(reason)
+        super().__init__(f"{path}: cannot be written ({self.reason})")
 
 
 class UnknownNameError(HdrusdError):

@@ -8,6 +8,7 @@ attributes). Files appear under their name only when they are whole.
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import tempfile
 from collections.abc import Callable, Mapping
@@ -19,7 +20,9 @@ import numpy.typing as npt
 import OpenEXR
 import OpenImageIO as oiio
 
-from hdrusd.errors import HdrusdError, InputError
+from hdrusd.errors import HdrusdError, InputError, OutputError
+from hdrusd.input_file import check_input
+from hdrusd.leftovers import clear_files, private_name
 from hdrusd.scene import ImageData
 
 #: Rec. 709 primaries and D65, CIE 1931 xy: red, green, blue, white.
@@ -71,8 +74,8 @@ def read_image(path: Path, data: bytes | None = None) -> ImageData:
 
 def read_small_image(path: Path, data: bytes | None, most: int) -> ImageData | None:
     """As ``read_image``; None, with nothing decoded, for a picture of more than ``most`` pixels."""
-    if data is None and not path.is_file():
-        raise InputError(path, "no such image")
+    if data is None:
+        check_input(path)
     with tempfile.TemporaryDirectory() as folder:
         real = path
         if data is not None:  # OpenImageIO's memory reader knows few formats
@@ -121,20 +124,26 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
     """Let ``write`` fill a temporary file beside ``path``, then rename it to ``path``.
 
     The temporary name keeps the suffix, by which libraries choose the format. On
-    any failure it is removed and ``path`` stays as it was. Raises OSError, and
-    HdrusdError for what an image library says, and for a path that is no place for a file.
+    any failure it is removed and ``path`` stays as it was. Raises OSError, OutputError for
+    what a library says, and HdrusdError for a path that is no place for a file.
     """
     path = place_for(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+    clear_files(path.parent.absolute())
+    temporary = path.with_name(private_name(path.suffix))
     try:
         write(temporary)
         temporary.replace(path)
     except BaseException as problem:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+        # Nobody knows the temporary name.
         if isinstance(problem, RuntimeError):
-            raise HdrusdError(f"{path}: cannot be written ({_first_line(str(problem))})") from None
+            said = str(problem).replace(str(temporary), path.name)
+            raise OutputError(path, _first_line(said)) from None
+        if isinstance(problem, OSError) and problem.filename in (None, str(temporary)):
+            text = f"cannot be written ({problem.strerror or problem})"
+            raise OSError(problem.errno or errno.EIO, text, str(path)) from problem
         raise
 
 
@@ -218,8 +227,7 @@ def read_exr_layers(
     They are multiplied by ``whiteLuminance`` too. One of another size than the picture is not
     given. Raises InputError.
     """
-    if not path.is_file():
-        raise InputError(path, "no such file")
+    check_input(path)
     try:
         with OpenEXR.File(str(path), header_only=True) as file:
             low, high = (np.asarray(v, np.int64) for v in file.header()["dataWindow"])
@@ -253,8 +261,7 @@ def read_exr_layers(
 
 def read_exr_header(path: Path) -> dict[str, Any]:
     """What an EXR says of itself, without its pixels. Raises InputError."""
-    if not path.is_file():
-        raise InputError(path, "no such file")
+    check_input(path)
     try:
         with OpenEXR.File(str(path), header_only=True) as file:
             return dict(file.header())

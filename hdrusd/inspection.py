@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hdrusd.errors import SourceRef, one_line
-from hdrusd.legacy.scene import Image, LegacyScene, Material, Mesh, Node
+from hdrusd.legacy.scene import MAPS, Image, LegacyScene, Material, Mesh, Node
 from hdrusd.report import Report
 
 #: Rows of a table on the terminal; the data have all.
@@ -23,8 +23,6 @@ _NAME = 36
 
 #: Units that a format may state of a light, and how they are written.
 _UNITS = (("candela", "cd"), ("lux", "lx"))
-
-_MAPS = ("diffuse_map", "emission_map", "opacity_map")
 
 _Row = dict[str, Any]
 
@@ -85,10 +83,8 @@ def _plain(value: Any) -> Any:
 
 def _material(material: Material) -> _Row:
     row: _Row = _plain(material)
-    for name in _MAPS:
-        texture = getattr(material, name)
-        if texture is not None:
-            row[name]["image"] = texture.image.name
+    for name, texture in material.maps().items():
+        row[name]["image"] = texture.image.name
     return row
 
 
@@ -118,12 +114,9 @@ def _images(materials: Iterable[Material]) -> list[_Row]:
     """Each image once, with its uses."""
     rows: dict[str, _Row] = {}
     for material in materials:
-        for name in _MAPS:
-            texture = getattr(material, name)
-            if texture is None:
-                continue
+        for name, texture in material.maps().items():
             image = texture.image
-            row = {"name": image.name, "state": _state(image), "file": None, "uses": []}
+            row: _Row = {"name": image.name, "state": _state(image), "file": None, "uses": []}
             row = rows.setdefault(image.name, row)
             row["file"] = None if image.path is None else str(image.path)
             row["uses"].append(f"{material.name}:{name.removesuffix('_map')}")
@@ -208,7 +201,7 @@ def _light(row: _Row) -> Sequence[str]:
 
 
 def _surface(row: _Row) -> Sequence[str]:
-    maps = [row[name]["image"] for name in _MAPS if row[name] is not None]
+    maps = [row[name]["image"] for name in MAPS if row[name] is not None]
     emission = _color(row["emission"]) + (" cd/m2" if row["emission_cd_m2"] else "")
     gloss = f" ^{row['shininess']:g}" if row["shininess"] else ""
     specular = _color(row["specular"]) + gloss

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from pxr import UsdLux
+from pxr import Sdf, Usd, UsdLux
 
 from hdrusd.account.lights import light_row
 from hdrusd.errors import SourceRef
@@ -19,10 +19,11 @@ from hdrusd.photometry.spread import SHAPES
 from hdrusd.report import Kind, Report
 from hdrusd.skies import Sky, SkyFiles, even_sky
 from hdrusd.usd.fixtures import Lamp
+from hdrusd.usd.placed import level_share
 from hdrusd.usd.preset_sky import write_sky_dome, write_sky_sun
 from hdrusd.usd.transform import across
 from hdrusd.usd.tree import Place
-from hdrusd.usd.writer import StageWriter
+from hdrusd.usd.writer import LightAt, StageWriter
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,21 +33,24 @@ class _Lamp:
     place: Place
     source: legacy.Light
     light: PhotometricLight
+    path: Sdf.Path | None
     right: legacy.Vec3 | None = None  # where C = 0 of its photometric file points
     flux: float | None = None  # lm of its photometric file
     shaded: bool = False  # by its own fixture too
     added: bool = False  # the source says nothing of it
 
-    def row(self, path: str, places: int) -> dict[str, Any]:
-        """The account of it for the report."""
+    def row(self, path: str, stands: Sequence[Usd.Prim]) -> dict[str, Any]:
+        """The account of it for the report. ``stands``: where it does, instances too."""
         return light_row(
             self.source.name,
             path,
             self.light,
             None if self.added else self.source,
             place=str(self.place.node.source),
-            places=places,
+            node=self.place.node.name,
+            places=len(stands),
             file_flux=self.flux,
+            level=level_share(stands) if self.light.kind == "distant" else 1.0,
         )
 
 
@@ -82,9 +86,12 @@ class LampMaker:
         for place in self.writer.places:
             for index in place.node.lights:
                 light = self.scene.lights[index]
+                local = light.kind != "ambient"
+                path = self.writer.light_path(place, light) if local else None
                 rule = self.added.get(index)
                 if rule is None:
-                    rule = self.sidecar.match("light", light.name, place.node.name)
+                    names = light.name, place.node.name
+                    rule = self.sidecar.match("light", *names, path=str(path or ""))
                 if light.kind == "ambient" and self.sidecar.ambient is not None:
                     text = f"{self.sidecar.ambient.place} says the sky; not added to it"
                     self.report.add(
@@ -97,16 +104,18 @@ class LampMaker:
                     ambients.append(meaning)
                 elif meaning is not None:
                     shaded = rule is not None and bool(rule.values.get("fixture_shadow"))
-                    lamp = _Lamp(place, light, meaning, shaded=shaded, added=index in self.added)
+                    added = index in self.added
+                    lamp = _Lamp(place, light, meaning, path, shaded=shaded, added=added)
                     if rule is not None and file is not None:
                         lamp = self._aimed(lamp, rule, file)
                     elif rule is not None:
                         lamp = self._shaped(lamp, rule)
                     lamps.append(lamp)
-        for lamp in lamps:
-            prim = self.writer.write_light(lamp.place, lamp.source, lamp.light, lamp.right)
-            places = len(self.writer.tree.copies.places(prim.GetPath()))
-            self.rows.append(lamp.row(str(prim.GetPath()), places))
+        at = [LightAt(it.place, it.source, it.light, it.right, it.path) for it in lamps]
+        places = self.writer.tree.copies.places
+        for lamp, prim in zip(lamps, self.writer.write_lights(at), strict=True):
+            stands = map(prim.GetStage().GetPrimAtPath, places(prim.GetPath()))
+            self.rows.append(lamp.row(str(prim.GetPath()), list(stands)))
             one = lamp.source.positions is None
             if lamp.light.kind in ("point", "spot") and one and not lamp.shaded:
                 self.fixed.append((lamp, Lamp(prim, lamp.light)))
@@ -174,12 +183,12 @@ class LampMaker:
         assert self.sidecar.ambient is not None
         others = [row["name"] for row in self.rows if row["kind"] == "distant"]
         for name in others:
-            text = "shines from a direction, beside the sky's own sun or moon; enabled = false"
-            text = f"{text} switches it off"
+            text = f"shines from a direction, beside the sky's own {sky.body.lower()}; "
+            text += "enabled = false switches it off"
             self.report.add(Kind.ASSUMED, "sky-two-suns", self.sidecar.ambient.place, name, text)
-        path = self.writer.photometry_path("Sun")
+        path = self.writer.photometry_path(sky.body)
         write_sky_sun(self.writer.stage, path, sky.sun, sky.towards)
-        self.rows.append(light_row("Sun", str(path), sky.sun))
+        self.rows.append(light_row(sky.body, str(path), sky.sun, level=max(sky.towards[1], 0.0)))
 
     def _ambient(self, from_lights: list[PhotometricLight]) -> PhotometricLight | None:
         """The sum of what the source calls ambient."""

@@ -11,11 +11,20 @@ from typing import Generic, TypeVar
 
 T = TypeVar("T")
 
+#: Processor cores that this process may use; macOS has no way to say.
+CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
 #: Threads; OpenImageIO and OpenEXR release the interpreter's lock.
-_WORKERS = min(len(os.sched_getaffinity(0)), 8)
+_workers = min(CORES, 8)
 
 #: Bytes of maps that wait to be written.
 _WAITING = 256 << 20
+
+
+def share(processes: int) -> None:
+    """Have fewer threads here, where so many processes do the same work beside this one."""
+    global _workers
+    _workers = max(_workers // processes, 1)
 
 
 class MapThreads(Generic[T]):
@@ -27,7 +36,7 @@ class MapThreads(Generic[T]):
 
     def __init__(self, wanted: Iterable[tuple[str, Callable[[], T]]]) -> None:
         self._wanted = iter(wanted)
-        self._pool = ThreadPoolExecutor(_WORKERS, "hdrusd-maps")
+        self._pool = ThreadPoolExecutor(_workers, "hdrusd-maps")
         self._ahead: dict[str, Future[T]] = {}
         self._taken: set[str] = set()
         self._behind: deque[tuple[int, Future[None]]] = deque()
@@ -65,7 +74,7 @@ class MapThreads(Generic[T]):
         return sum(size for size, _ in self._behind)
 
     def _start(self) -> None:
-        while len(self._ahead) < 2 * _WORKERS:
+        while len(self._ahead) < 2 * _workers:
             key, make = next(self._wanted, (None, None))
             if key is None or make is None:
                 return

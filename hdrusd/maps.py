@@ -74,6 +74,7 @@ class MapWriter:
         self._kept = 0  # bytes of them
         self._keys: dict[int, tuple[Image, str]] = {}  # of pictures in memory, by id()
         self._looks: dict[str, str] = {}
+        self._data: dict[str, str] = {}
         self._threads: MapThreads[_Picture | InputError | None] | None = None
 
     @contextmanager
@@ -102,6 +103,20 @@ class MapWriter:
                 return None
             self._looks[key] = name
         return Map(f"{self.prefix}/{self._looks[key]}", texture, raw=False)
+
+    def data(self, texture: Texture) -> Map | None:
+        """A copy of an image whose texels are no colours, with all their bits, to be read raw.
+
+        None where it is missing or broken.
+        """
+        key = self._key(texture.image)
+        if key is None or self._read(texture.image, key) is None:
+            return None
+        if key not in self._data:
+            made = self._deep(texture.image, key) or self.look(texture)
+            assert made is not None
+            self._data[key] = made.file
+        return Map(self._data[key], texture, raw=True)
 
     def reflectance(
         self, texture: Texture, diffuse: RGB, gamma: float, place: SourceRef, thing: str
@@ -243,15 +258,21 @@ class MapWriter:
         else:
             self._threads.submit(size, work)
 
+    def _deep(self, image: Image, key: str) -> Map | None:
+        """Of a format that not every renderer reads, and more than the 8 bits of a look's copy."""
+        picture = self._read(image, key)
+        if picture is None or picture.pixels.dtype == np.uint8 or _format(image) in _PORTABLE:
+            return None
+        name = _name(image, "D", key)
+        self._do(4 * picture.pixels.size, partial(_write_deep, self.folder / name, picture.pixels))
+        self.written.setdefault(name, {"kind": "data", "image": image.name})
+        return Map(f"{self.prefix}/{name}", Texture(image), raw=True)
+
     def _copy(self, image: Image, key: str) -> str | None:
         picture = self._read(image, key)
         if picture is None:
             return None
-        data = image.data
-        if data is None and image.path is not None:
-            with image.path.open("rb") as file:
-                data = file.read(_MAGIC)
-        suffix = _suffix(data)
+        suffix = _format(image)
         if suffix in _PORTABLE:
             name = _name(image, "", key, suffix)
             self._do(0, partial(_write_copy, self.folder / name, image))
@@ -311,6 +332,14 @@ def _write_map(path: Path, color: npt.NDArray[Any]) -> None:
     write_exr(path, color, half=True, luminance=False, compression="piz")
 
 
+def _write_deep(path: Path, pixels: npt.NDArray[np.generic]) -> None:
+    """Floats as they are and integers over their largest; grey is spread over three channels."""
+    values = np.nan_to_num(pixels.astype(np.float32))
+    if values.shape[2] < 3:
+        values = np.concatenate([values[..., :1]] * 3 + [values[..., 1:]], axis=-1)
+    write_exr(path, values, luminance=False)
+
+
 def _write_coded(path: Path, codes: npt.NDArray[Any], gamma: float, diffuse: RGB) -> None:
     _write_map(path, coded_reflectance(codes, gamma, diffuse))
 
@@ -354,6 +383,14 @@ def _eight_bit(pixels: npt.NDArray[np.generic]) -> npt.NDArray[np.uint8]:
 
 def _bytes(pixels: npt.NDArray[np.uint8] | None) -> bytes:
     return b"" if pixels is None else f"{pixels.shape}".encode() + pixels.tobytes()
+
+
+def _format(image: Image) -> str:
+    """As ``_suffix``, of an image that is not missing."""
+    if image.data is None and image.path is not None:
+        with image.path.open("rb") as file:
+            return _suffix(file.read(_MAGIC))
+    return _suffix(image.data)
 
 
 def _suffix(data: bytes | None) -> str:

@@ -36,6 +36,9 @@ class Registry(Generic[T]):
         plugins = (entry.name for entry in entry_points(group=self.group))
         return sorted({*self._targets, *plugins})
 
+    def __contains__(self, name: object) -> bool:
+        return name in self._targets or name in self.names()  # metadata take milliseconds
+
     def __iter__(self) -> Iterator[str]:
         return iter(self.names())
 

@@ -18,7 +18,8 @@ from hdrusd.report import Kind, Report
 
 @dataclass(frozen=True, slots=True)
 class Sky:
-    """A sky to be written: lux on a level ground, a picture in cd/m2 if it has one, and its sun.
+    """A sky to be written: lux on a level ground, a picture in cd/m2 if it has one, and its sun
+    or moon, as ``body`` calls it.
 
     ``towards``: the sun or the moon, with +Y up, -Z north and +X east.
     """
@@ -27,6 +28,7 @@ class Sky:
     picture: str = ""  # as the layers call it
     sun: PhotometricLight | None = None
     towards: tuple[float, float, float] = (0.0, 1.0, 0.0)
+    body: str = ""
 
 
 def even_sky(rule: Rule, color: RGB | None) -> Sky:
@@ -90,7 +92,7 @@ class SkyFiles:
         picture = ""
         if made.picture is not None and made.lux > 0.0:
             picture = self._write(f"sky_{preset.name}", made.picture[..., None] * np.array(hue))
-        return Sky(light, picture, sun, made.towards)
+        return Sky(light, picture, sun, made.towards, preset.body)
 
     def _takes(self, rule: Rule, altitude: float) -> bool:
         preset = PRESETS[rule.values["preset"]]

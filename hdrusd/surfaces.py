@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.account.wear import texels
-from hdrusd.legacy.scene import RGB, LegacyScene, Material, Texture
+from hdrusd.legacy.scene import DATA_MAPS, RGB, LegacyScene, Material, Texture
+from hdrusd.legacy.texels import texels
 from hdrusd.maps import MapWriter
 from hdrusd.photometry.confidence import confidence
 from hdrusd.photometry.interpret import Interpreter, luminance
@@ -46,7 +46,7 @@ class SurfaceMaker:
     report: Report
 
     def look(self, material: Material) -> dict[str, Map]:
-        """The textures of the look as it was, by "diffuse", "emission", "opacity"."""
+        """The textures of the look as it was, by "diffuse", "normal": as the fields."""
         peak = max(*material.emission, 1.0) if material.emission_cd_m2 else 1.0
         emission: RGB = tuple(c / peak for c in material.emission)  # type: ignore[assignment]
         covered = material.diffuse_map is not None and material.diffuse_map.mode in _COVERING
@@ -54,12 +54,14 @@ class SurfaceMaker:
         uses = {
             "diffuse": (material.diffuse_map, diffuse),
             "emission": (material.emission_map, emission),
+            "specular": (material.specular_map, material.specular),
         }
         maps = {
             role: replace(made, scale=factor)  # the LDR picture is the texture times the factor
             for role, (texture, factor) in uses.items()
             if texture is not None and (made := self.maps.look(texture)) is not None
         }
+        maps |= self._data(material)
         opacity = self._opacity(material)
         return maps if opacity is None else maps | {"opacity": opacity}
 
@@ -75,6 +77,10 @@ class SurfaceMaker:
             return material
         specular = rule.three("specular")
         roughness, shininess = rule.number("roughness"), rule.number("shininess")
+        if specular is not None:
+            material = replace(material, specular_map=None, metallic_map=None)
+        if roughness is not None or shininess is not None:
+            material = replace(material, roughness_map=None)
         if material.pbr is None and roughness is None:
             shininess = material.shininess if shininess is None else shininess
             return replace(material, specular=specular or material.specular, shininess=shininess)
@@ -119,14 +125,22 @@ class SurfaceMaker:
         if lamp and mean is not None:
             emission = self._at_one(material, emission, gamma, places, hdr=hdr)
         emission_map = self._emission_map(material, emission, gamma, hdr=hdr)
+        # What glows by a map of its own reflects, as a post does below its glass.
+        dark = lamp and (emission_map is None or material.emission_map is None)
         reflectance = None
-        if textured is not None and not lamp:
+        if textured is not None and not dark:
             reflectance = self.maps.reflectance(
                 textured, diffuse, gamma, material.source, material.name
             )
+        shine = material.specular_map
+        specular_map = None
+        if shine is not None and not dark:
+            specular_map = self.maps.reflectance(
+                shine, material.specular, gamma, material.source, material.name
+            )
         diffuse = self._clipped(material, "diffuse", diffuse)
         specular = self._clipped(material, "specular", material.specular)
-        if not lamp:
+        if not dark:
             self._note_differences(material, diffuse, specular, colored=colored)
         bright = any(emission)
         if rule is not None and not bright and _REFLECTION & rule.values.keys():
@@ -143,8 +157,10 @@ class SurfaceMaker:
             emission=emission,
             luminance=luminance(emission),
             emission_map=emission_map,
-            replaces_reflection=lamp,
+            replaces_reflection=dark,
             opacity_map=self._opacity(material),
+            specular_map=specular_map,
+            data_maps={} if dark else self._data(material),
             vertex_color=COLOR_PRIMVAR if colored else "",
             provenance=provenance,
             rule=name,
@@ -250,6 +266,12 @@ class SurfaceMaker:
             return None
         made = self.maps.look(material.opacity_map)
         return replace(made, raw=True) if made else None
+
+    def _data(self, material: Material) -> dict[str, Map]:
+        """Maps whose texels are data, by what they give; copies that are read raw."""
+        maps = material.maps()
+        made = {name: self.maps.data(maps[name]) for name in DATA_MAPS if name in maps}
+        return {name.removesuffix("_map"): used for name, used in made.items() if used is not None}
 
     def _clipped(self, material: Material, name: str, color: RGB) -> RGB:
         r, g, b = (min(max(c, 0.0), 1.0) for c in color)

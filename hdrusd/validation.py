@@ -163,16 +163,20 @@ _AREA_KINDS = frozenset({"sphere", "disk", "rect", "cylinder"})
 @_task
 def check_light(prim: Usd.Prim, span: UsdValidation.ValidationTimeRange) -> Iterator[_Fault]:
     """A light's numbers are sound, and say the same in UsdLux and in photometric units."""
-    sources = {name: lux.input_source(prim, name) for name in _LIGHT_NUMBERS}
+    authored = {attribute.GetName() for attribute in prim.GetAuthoredAttributes()}
+    stated = [name for name in _LIGHT_NUMBERS if f"inputs:{name}" in authored]
+    sources = {name: lux.input_source(prim, name) for name in stated}
     broken = [
         fault
-        for name, allowed in _LIGHT_NUMBERS.items()
-        for fault in _bad_numbers(sources[name], f"inputs:{name}", span, allowed)
+        for name, source in sources.items()
+        for fault in _bad_numbers(source, f"inputs:{name}", span, _LIGHT_NUMBERS[name])
     ]
     yield from broken
     kind = lux.light_kind(prim)
+    world = None
     if kind in _AREA_KINDS:
-        yield from _ambiguous_size(prim, kind)
+        world = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(Usd.TimeCode.EarliestTime())
+        yield from _ambiguous_size(prim, kind, world)
     wrong = "illuminance" if kind in _AREA_KINDS else "luminousIntensity"
     if kind != "other" and _authored(prim, f"inputs:photometric:{wrong}"):
         right = "luminousIntensity (cd)" if kind in _AREA_KINDS else "illuminance (lx)"
@@ -185,10 +189,10 @@ def check_light(prim: Usd.Prim, span: UsdValidation.ValidationTimeRange) -> Iter
             text = "luminousIntensity beside a photometric file, whose candela count; want one"
             yield _Fault("CandelaAndFile", text, warning=True)
     elif not broken and kind != "other":
-        yield from _disagreement(prim, kind in _AREA_KINDS, _times(sources.values(), span))
+        yield from _disagreement(prim, world, _times(sources.values(), span))
 
 
-def _ambiguous_size(prim: Usd.Prim, kind: str) -> Iterator[_Fault]:
+def _ambiguous_size(prim: Usd.Prim, kind: str, world: Gf.Matrix4d) -> Iterator[_Fault]:
     """Where renderers may read the size of a light in different ways."""
     unit = UsdGeom.GetStageMetersPerUnit(prim.GetStage())
     normalize = lux.input_source(prim, "normalize").Get(Usd.TimeCode.EarliestTime())
@@ -201,7 +205,6 @@ def _ambiguous_size(prim: Usd.Prim, kind: str) -> Iterator[_Fault]:
         )
     if kind not in {"sphere", "cylinder"}:
         return
-    world = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(Usd.TimeCode.EarliestTime())
     linear = np.array(world, np.float64)[:3, :3]
     scales = np.linalg.svd(linear, compute_uv=False) if np.isfinite(linear).all() else np.ones(3)
     if scales[0] - scales[-1] > AGREEMENT * scales[0]:
@@ -212,14 +215,20 @@ def _ambiguous_size(prim: Usd.Prim, kind: str) -> Iterator[_Fault]:
         )
 
 
-def _disagreement(prim: Usd.Prim, placed: bool, times: list[Usd.TimeCode]) -> Iterator[_Fault]:
-    """The plain UsdLux reading against the photometric value, once, at the first such time."""
-    name, unit = ("luminousIntensity", "cd") if placed else ("illuminance", "lx")
+def _disagreement(
+    prim: Usd.Prim, first: Gf.Matrix4d | None, times: list[Usd.TimeCode]
+) -> Iterator[_Fault]:
+    """The plain UsdLux reading against the photometric value, once, at the first such time.
+
+    ``first``: local to world at the earliest time, of a light with a place.
+    """
+    name, unit = ("illuminance", "lx") if first is None else ("luminousIntensity", "cd")
     if not _authored(prim, f"inputs:photometric:{name}"):
         return
     source = lux.input_source(prim, f"photometric:{name}")
     for time in times:
-        said, reading = source.Get(time), lux.read_lux(prim, time)
+        world = first if time.IsEarliestTime() else None
+        said, reading = source.Get(time), lux.read_lux(prim, time, world=world)
         if said is None or reading is None:
             continue
         plain = luminance(reading.intensity)
@@ -391,9 +400,9 @@ def _bad_numbers(
         if not isinstance(value, (int, float, Gf.Vec3f, Gf.Vec3d, Gf.Vec3h, Gf.Vec4f)):
             yield _Fault("NoNumber", f"{name} {value!r}; want {allowed.want}")
             return
-        numbers = np.asarray(value, np.float64)
-        finite = bool(np.isfinite(numbers).all())
-        if not finite or numbers.min() < allowed.least or numbers.max() > allowed.most:
+        numbers = (value,) if isinstance(value, (int, float)) else tuple(value)
+        finite = all(map(math.isfinite, numbers))
+        if not finite or min(numbers) < allowed.least or max(numbers) > allowed.most:
             problem = f"{name} {_channels(numbers)}{_when(time)}; want {allowed.want}"
             yield _Fault("OutOfRange" if finite else "NotFinite", problem)
             return

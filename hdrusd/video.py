@@ -8,7 +8,6 @@ IEC 61966-2-1.
 from __future__ import annotations
 
 import contextlib
-import os
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
@@ -17,8 +16,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.errors import HdrusdError, ParameterError
+from hdrusd.errors import HdrusdError, OutputError, ParameterError
 from hdrusd.images import place_for
+from hdrusd.leftovers import clear_files, private_name
 
 #: H.264 comes first; what is in the wheels of PyAV depends on the platform.
 _CODECS = ("libx264", "libopenh264", "mpeg4")
@@ -70,7 +70,7 @@ class VideoWriter:
         self.rate = frame_rate(fps)
         self.frames = 0
         self._size: tuple[int, int] | None = None
-        self._temporary = path.with_name(f".{path.stem}.{os.getpid()}.part.mp4")
+        self._temporary = path.with_name(private_name(".mp4"))
         self._container: Any = None
         self._stream: Any = None
 
@@ -125,6 +125,7 @@ class VideoWriter:
         if codec is None:
             raise HdrusdError(f"video: PyAV has no encoder; want one of {', '.join(_CODECS)}")
         self.path.parent.mkdir(parents=True, exist_ok=True)
+        clear_files(self.path.parent.absolute())
         with self._told():
             self._container = av.open(str(self._temporary), "w", options=_CONTAINER)
             options = _QUALITY.get(codec, {})
@@ -173,4 +174,4 @@ class VideoWriter:
             yield
         except av.FFmpegError as problem:
             text = problem.strerror or "FFmpeg"
-            raise HdrusdError(f"{self.path}: cannot be written ({text})") from None
+            raise OutputError(self.path, text) from None

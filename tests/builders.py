@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from pxr import Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
 import hdrusd.usd  # noqa: F401 (registers the schemas before the first stage)
 from hdrusd.errors import SourceRef
 from hdrusd.images import write_png
 from hdrusd.legacy.scene import Image, LegacyScene, Light, Material, Mesh, Node, Texture
 from hdrusd.scene import light_rows
+from hdrusd.usd.specs import define
 
 #: Where everything made here says that it comes from.
 HERE = SourceRef(Path("street.osgt"), 7)
@@ -97,6 +98,11 @@ def new_stage(unit: float = 1.0, up: str = "Y") -> Usd.Stage:
     UsdGeom.SetStageUpAxis(stage, up)
     _STAGES.append(stage)
     return stage
+
+
+def new_spec(stage: Usd.Stage, path: str, kind: str) -> Sdf.PrimSpec:
+    """A prim of a type that says nothing yet, in the stage's root layer."""
+    return define(stage.GetRootLayer(), Sdf.Path(path), kind)
 
 
 # -- source files -------------------------------------------------------------------------

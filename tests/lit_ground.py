@@ -24,7 +24,7 @@ def seen(gl: Any, result: Result, *parts: str) -> npt.NDArray[np.float64]:
     """
     text = result.output.read_text(encoding="utf-8")
     result.output.write_text("\n".join([text, CAMERA, *parts]), encoding="utf-8")
-    job = Job(result.output, width=WIDTH, height=HEIGHT, shadows="none", camera="/Camera")
+    job = Job(result.output, width=WIDTH, height=HEIGHT, shadows=False, camera="/Camera")
     (frame,) = render_sequence(gl, job, Report())
     return np.asarray(frame.hdr[..., :3].astype(np.float64) @ LUMINANCE_WEIGHTS)
 

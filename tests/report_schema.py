@@ -7,11 +7,24 @@ from importlib.resources import files
 from typing import Any
 
 from jsonschema import Draft202012Validator
+from referencing import Registry, Resource
+from referencing.jsonschema import DRAFT202012
 
 SCHEMA: dict[str, Any] = json.loads(
     files("hdrusd.account").joinpath("report.schema.json").read_text(encoding="utf-8")
 )
 _VALIDATOR = Draft202012Validator(SCHEMA)
+BATCH_SCHEMA: dict[str, Any] = json.loads(
+    files("hdrusd.account").joinpath("batch.schema.json").read_text(encoding="utf-8")
+)
+_REGISTRY = Registry().with_resources([("report.schema.json", Resource(SCHEMA, DRAFT202012))])
+_BATCH_VALIDATOR = Draft202012Validator(BATCH_SCHEMA, registry=_REGISTRY)
+
+
+def batch_problems(document: dict[str, Any]) -> list[str]:
+    """What of the report of many conversions its schema forbids."""
+    plain = json.loads(json.dumps(document))
+    return [f"{list(e.path)}: {e.message}" for e in _BATCH_VALIDATOR.iter_errors(plain)]
 
 
 def problems(document: dict[str, Any]) -> list[str]:

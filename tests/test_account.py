@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -20,12 +21,11 @@ from report_schema import SCHEMA, problems, undescribed
 
 from hdrusd.account.fix_first import MOST, Scene, fix_first
 from hdrusd.account.images import image_rows
-from hdrusd.account.lights import group_pattern
-from hdrusd.account.reflectances import toml_entry
 from hdrusd.account.text import summary
 from hdrusd.account.wear import wearers, worn
 from hdrusd.conversion import Result
 from hdrusd.legacy.scene import Subset, Texture
+from hdrusd.photometry.recipe_entry import toml_entry
 from hdrusd.usd.material import Surface
 
 GREY = np.full((64, 64, 3), 100, np.uint8)
@@ -328,21 +328,6 @@ def test_a_copied_line_is_a_guess_where_it_was_one(
     assert after.lights[0]["value"] == pytest.approx(before.lights[0]["value"], rel=5e-4)
 
 
-def fixes(folder: Path, text: str, shape: str = "v -9 0 9\nv 9 0 9\nv 9 0 -9\nv -9 0 -9") -> Any:
-    """What to fix first of a grey square with a photometry file."""
-    sidecar(folder, text)
-    (folder / "a.mtl").write_text("newmtl grey\nKd 0.5 0.5 0.5\nnewmtl sky\nKd 0 0 0\nKe 1 1 1\n")
-    (folder / "a.obj").write_text(f"mtllib a.mtl\n{shape}\nusemtl grey\nf 1 2 3 4\n")
-    return run(folder / "a.obj", source_unit=1.0).as_dict()["fix_first"]
-
-
-@pytest.mark.parametrize("stated", ["", "illuminance = 0.2\n"])
-def test_a_preset_is_mended_where_it_stands(tmp_path: Path, stated: str) -> None:
-    for entry in fixes(tmp_path, f'[ambient]\npreset = "moonlit"\n{stated}'):
-        assert entry["write"] is None  # no [[light]] fits the moon, and [ambient] is there
-        assert entry["why"].endswith("; the number stands in ambient there")
-
-
 def test_a_number_of_the_file_is_mended_in_its_entry(tmp_path: Path) -> None:
     text = "; the number stands in {}[1] there"
     sidecar(tmp_path, '[[light]]\nmatch = "spot"\ncandela = 2000\ntemperature = 3000\n')
@@ -352,46 +337,6 @@ def test_a_number_of_the_file_is_mended_in_its_entry(tmp_path: Path) -> None:
     glass = run(obj(tmp_path / "b.obj", "Kd 1 1 1"), source_unit=1.0).as_dict()["fix_first"]
     (entry,) = (e for e in glass if e["what"].startswith("paint"))
     assert (entry["write"], entry["why"].endswith(text.format("material"))) == (None, True)
-
-
-def test_a_wall_has_light_though_nothing_is_below_it(tmp_path: Path) -> None:
-    wall = "v -9 0 0\nv 9 0 0\nv 9 9 0\nv -9 9 0"
-    (sun, sky) = fixes(tmp_path, '[ambient]\npreset = "clear-sun"\n', wall)
-    assert (sun["what"][:4], sky["what"][:4]) == ("Sun:", "Sky:")
-    # 127,500 exp(-0.21 / sin 45) lx of the sun, 0.8 + 15.5 sqrt(sin 45) klx of the sky; half.
-    beam = 127_500 * np.exp(-0.21 * np.sqrt(2))
-    share = beam / (beam + 800 + 15_500 * 0.5**0.25)
-    assert sun["impact"] == pytest.approx(0.5 * share, abs=1e-4)
-
-
-def test_what_glows_takes_nothing_from_a_lamps_share(tmp_path: Path) -> None:
-    dome = (
-        "v -9 0 9\nv 9 0 9\nv 9 0 -9\nv -9 0 -9\nv -5e3 0 0\nv 5e3 0 0\nv 5e3 5e3 0\nv -5e3 5e3 0\n"
-        "usemtl sky\nf 5 6 7 8"
-    )
-    guess = '[[lamp]]\nat = [[0, 5, 0]]\ncandela = 400\nprovenance = "estimated"\n'
-    impacts = {e["what"].partition(":")[0]: e["impact"] for e in fixes(tmp_path, guess, dome)}
-    assert impacts["Lamp"] == 0.5  # all of the light, half a decade
-    assert impacts["sky"] == pytest.approx(1.0, abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("names", "pattern"),
-    [
-        (("ls0", "ls1", "ls12"), "ls*"),
-        (("ls0", "ls1", "lsx"), "ls[0-9]*"),
-        (("ls0", "ls1", "ls2x"), "ls0"),
-        (("ls0", "ls1", "board"), "ls*"),
-        (("ls[0", "ls[1", "board"), "ls[[]*"),
-    ],
-)
-def test_a_pattern_fits_a_group_and_no_other(names: tuple[str, ...], pattern: str) -> None:
-    others = names[2:] if names[2] != "ls12" else ()
-    group = [{"name": name} for name in names if name not in others]
-    assert group_pattern(group, sorted(names)) == pattern
-    fitting = {name for name in names if fnmatchcase(name, pattern)}
-    assert fitting <= {row["name"] for row in group}
-    assert fitting == {row["name"] for row in group} or pattern == "ls0"
 
 
 def test_an_entry_is_toml_whatever_the_name() -> None:
@@ -411,6 +356,18 @@ def test_a_material_is_looked_for_on_its_own_meshes_alone() -> None:
     assert meshes == {0: [0], 1: [1, 2], None: [1]}
     found = worn(scene, {0: 1.0, 1: 2.0, 2: 3.0}, 1, meshes[1])
     assert (found.faces, found.area) == (2, 5.0)
+
+
+def test_faces_in_no_subset_wear_what_the_mesh_has() -> None:
+    parts = (Subset(1, np.array([2], np.int32)), Subset(3, np.array([0], np.int32)))
+    mesh = replace(
+        square(material=7, subsets=parts),
+        face_counts=np.array([4, 4, 4], np.int32),
+        face_indices=np.tile(np.arange(4, dtype=np.int32), 3),
+    )
+    assert mesh.face_materials().tolist() == [3, 7, 1]
+    assert mesh.wears(7).tolist() == [False, True, False]
+    assert replace(mesh, material=None).face_materials().tolist() == [3, -1, 1]
 
 
 def test_pictures_are_shared_by_materials_of_one_name(tmp_path: Path) -> None:

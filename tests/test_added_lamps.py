@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -153,3 +154,34 @@ def test_a_lamp_of_no_strength_does_not_shine(tmp_path: Path) -> None:
     assert result.lights == []
     (finding,) = (f for f in result.report if f.code == "sidecar-invalid")
     assert finding.text.startswith("no strength; not placed; want one of candela, ies,")
+
+
+@pytest.mark.parametrize(
+    ("rest", "told"),
+    [
+        ("cutoff = 60", True),
+        ('lumens = 900\nspread = "hemisphere"', True),
+        ("cutoff = 60\naxis = [0, 0, -1]", False),
+        ("candela = 9", False),  # shines everywhere
+    ],
+)
+def test_down_of_a_turned_node_is_told(tmp_path: Path, rest: str, told: bool) -> None:
+    """Turned by 30 degrees about X, and once more by the node above it."""
+    half = math.radians(15.0)
+    turned = [math.sin(half), 0.0, 0.0, math.cos(half)]
+    document = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0, 2]}],
+        "nodes": [
+            {"name": "arm", "rotation": turned, "children": [1]},
+            {"name": "head", "rotation": turned, "camera": 0},
+            {"name": "head", "translation": [4, 0, 0], "camera": 0},
+        ],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.1}}],
+    }
+    (tmp_path / "a.gltf").write_text(json.dumps(document))
+    strength = "" if "candela" in rest or "lumens" in rest else "candela = 9\n"
+    sidecar(tmp_path, f'[[lamp]]\nmatch = "head"\n{strength}{rest}\n')
+    found = [f.text for f in run(tmp_path / "a.gltf").report if f.code == "light-aim"]
+    text = "points 60 degrees off straight down, as its node head is turned; axis says otherwise"
+    assert [t for t in found if t.startswith("points")] == [text] * told

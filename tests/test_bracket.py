@@ -370,7 +370,7 @@ def test_files_that_are_no_pictures_are_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError):
         merged(files)
     files[1].unlink()
-    with pytest.raises(InputError, match="no such image"):
+    with pytest.raises(InputError, match="no such file"):
         merged(files)
 
 

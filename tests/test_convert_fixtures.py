@@ -14,8 +14,10 @@ from builders import gltf_lights
 from converted import lights, opened, run, sidecar
 from pxr import Sdf, Usd, UsdGeom, UsdLux
 
+import hdrusd.usd.fixtures
 from hdrusd.conversion import Result
 from hdrusd.job import Job
+from hdrusd.photometry.fixture import stopped
 from hdrusd.render import render_sequence
 from hdrusd.report import Report
 from hdrusd.usd.fixtures import PlacedMesh, free_from
@@ -197,6 +199,39 @@ def test_of_copies_each_lamp_leaves_out_its_own(tmp_path: Path) -> None:
             if mesh.IsA(UsdGeom.Mesh) and not query.IsPathIncluded(mesh.GetPath())
         ]
     assert found == {f"post{i}": [f"post{i}"] for i in range(3)}
+
+
+def test_posts_that_stand_alike_are_looked_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Forty posts of two makes, ten of each turned: four looks."""
+    looks = []
+
+    def noted(*args: Any) -> Any:
+        looks.append(args)
+        return stopped(*args)
+
+    monkeypatch.setattr(hdrusd.usd.fixtures, "stopped", noted)
+    open_above = box((-0.3, 9.8, -0.3), (0.3, 10.05, 0.3))
+    nodes: list[dict[str, Any]] = []
+    for i in range(40):
+        place = {"translation": [20.0 * i, 0.1 * i, -7.0 * i], "rotation": [0, i % 4 // 2, 0, 1]}
+        if i % 4 < 2:
+            del place["rotation"]
+        nodes.append({"name": f"post{i}", "mesh": i % 2, "children": [40 + i], **place})
+    nodes += [
+        {"name": f"at{i}", "translation": [0, 10, 0], "extensions": {LIGHT: {"light": 0}}}
+        for i in range(40)
+    ]
+    result = run(write(tmp_path / "s.gltf", {"A": HOUSING, "B": open_above}, nodes))
+    assert len(looks) == 4
+    lamps = [p for p in opened(result).Traverse() if p.HasAPI(UsdLux.LightAPI)]
+    links = [UsdLux.LightAPI(lamp).GetShadowLinkCollectionAPI() for lamp in lamps]
+    targets = [link.GetExcludesRel().GetTargets() for link in links]
+    # Each its own post: the parent of what it leaves out is the parent of its node.
+    posts = [lamp.GetParent().GetParent().GetPath() for lamp in lamps]
+    assert len(posts) == 40
+    assert [[path.GetParentPath() for path in some] for some in targets] == [[p] for p in posts]
 
 
 @pytest.mark.parametrize("unit", [1.0, 0.01])

@@ -11,6 +11,7 @@ import pytest
 from builders import gltf_lights, obj
 from converted import MOON, lights, opened, run, sidecar
 from lit_ground import findings, rows, seen
+from overlaid import stage_file
 from pxr import Gf, Usd, UsdGeom, UsdLux
 from stage_text import GROUND
 
@@ -81,11 +82,24 @@ def test_the_domes_picture_is_upright(tmp_path: Path, up: str) -> None:
     assert tuple(top) == pytest.approx((0, 1, 0) if up == "Y" else (0, 0, 1), abs=1e-12)
     north = world.TransformDir(Gf.Vec3d(0, 0, -1))
     assert tuple(north) == pytest.approx((0, 0, -1) if up == "Y" else (0, 1, 0), abs=1e-12)
-    moon = UsdGeom.Xformable(lights(stage)["Sun"])
+    moon = UsdGeom.Xformable(lights(stage)["Moon"])
     way = -moon.ComputeLocalToWorldTransform(Usd.TimeCode.Default()).TransformDir(
         Gf.Vec3d(0, 0, -1)
     )
     assert Gf.Dot(way, north) == pytest.approx(math.cos(math.radians(20.0)), abs=1e-12)
+
+
+def test_a_stage_gets_its_moon_too(tmp_path: Path) -> None:
+    source = stage_file(tmp_path / "town.usda", GROUND)
+    sidecar(tmp_path, '[ambient]\npreset = "moonlit"\n')
+    result = run(source, tmp_path / "night.usda")
+    assert set(rows(result)) == {"Sky", "Moon"}
+    assert opened(result).GetPrimAtPath(rows(result)["Moon"]["path"]).GetName() == "Moon"
+    # The ground gets lux times sin 45 of it.
+    moon = rows(result)["Moon"]
+    assert moon["level_lux"] == pytest.approx(moon["value"] * math.sqrt(0.5), rel=1e-12)
+    again = run(result.output, tmp_path / "again.usda")
+    assert rows(again)["Moon"]["level_lux"] == pytest.approx(moon["level_lux"], rel=1e-6)
 
 
 def test_a_stated_illuminance_takes_the_presets_place(tmp_path: Path) -> None:
@@ -122,7 +136,8 @@ def test_an_altitude_that_a_sky_cannot_have(tmp_path: Path, text: str) -> None:
 def test_a_stated_number_is_not_the_presets(tmp_path: Path) -> None:
     said = 'preset = "moonlit"\nilluminance = 0.2'
     found = rows(sky(tmp_path, said))
-    for name in ("Sky", "Sun"):
+    assert set(found) == {"Sky", "Moon"}
+    for name in found:
         assert (found[name]["source"], found[name]["confidence"]) == ("", "medium")
         assert found[name]["rule"] == "photometry.toml:ambient, sky moonlit"
     measured = rows(sky(tmp_path, f'{said}\nsource = "meter, 3 May"'))["Sky"]

@@ -154,6 +154,16 @@ def test_what_is_no_stage_is_told_in_one_line(
     assert not (tmp_path / "out").exists()
 
 
+def test_an_overlay_of_a_source_elsewhere_names_the_root_that_it_wants(tmp_path: Path) -> None:
+    source = stage_file(tmp_path / "town" / "town.usda", LAMP)
+    first = run(source, tmp_path / "night" / "night.usda")
+    says_nothing_new(first.output, run(first.output, tmp_path / "b.usda", roots=(source.parent,)))
+    with pytest.raises(InputError) as raised:
+        run(first.output, tmp_path / "again.usda")
+    wanted = f"outside the declared roots; not converted; --root {source.parent} would allow it"
+    assert str(raised.value) == f"night.usda: {source}: {wanted}"
+
+
 @pytest.mark.parametrize("name", ["empty.usda", "empty.usdc", "ref_cycle_a.usda"])
 def test_hostile_files(tmp_path: Path, testdata: Path, name: str) -> None:
     with pytest.raises(InputError, match=name):

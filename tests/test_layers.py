@@ -20,19 +20,19 @@ PACKAGES = {"hdrusd": "hdrusd", "cli": "hdrusd.cli", "schemas": "hdrusd.schemas"
 #: "" is hdrusd/__init__ itself.
 LAYERS = (
     {"", "errors", "units"},
-    {"frames", "registry", "report"},
+    {"frames", "input_file", "leftovers", "registry", "report"},
     {"colour", "schemas", "legacy", "scene"},
     {"eye"},
     {"glare", "photometry", "tonemap"},
     {"importers", "images"},
-    {"usd", "gpu", "adaptation_log", "bracket", "contact_sheet", "course", "video"}
+    {"usd", "gpu", "bracket", "contact_sheet", "course", "plots", "video"}
     | {"frame_header", "frame_io", "map_threads"},
-    {"account", "added_lamps", "candela_plot", "delivery", "inspection", "job", "luminaires"}
-    | {"maps", "recipe", "skies", "validation", "viewing"},
+    {"account", "adaptation_log", "added_lamps", "candela_plot", "delivery", "inspection"}
+    | {"job", "luminaires", "maps", "recipe", "skies", "validation", "viewing"},
     {"by_products", "conversion", "lamps", "resuming", "surfaces"},
     {"display", "overlay"},
     {"convert", "render"},
-    {"testing"},
+    {"batch", "testing"},
     {"cli"},
 )
 
@@ -44,7 +44,7 @@ THIRD_PARTY = {
     "OpenImageIO": {"bracket", "contact_sheet", "images"},
     "PyOpenColorIO": {"tonemap"},
     "av": {"video"},
-    "matplotlib": {"adaptation_log", "candela_plot"},
+    "matplotlib": {"adaptation_log", "candela_plot", "plots"},
     "click": {"cli"},
     "ufbx": {"importers"},  # in a worker process only: tests/importers/test_fbx.py
     "numpy": set().union(*LAYERS),

@@ -132,6 +132,18 @@ def test_what_glows_alone_lights_nothing() -> None:
     assert found(scene)["lamp post"].offset == (5.0, 5.0, 4.0)
 
 
+def test_a_post_that_glows_by_its_map_has_its_lamp_where_the_map_is_bright() -> None:
+    """The map's upper quarter is white, and its middle at 0.875; each triangle is looked at in
+    eighths of its edges, so the middle is known to a sixteenth.
+    """
+    shown = np.zeros((64, 64, 3))
+    shown[:16] = 1.0
+    glass = paint(name="street_lamp", emission=(1.0,) * 3, emission_map=texture())
+    scene = one_square(materials=[glass], roots=[node("post", meshes=[0])])
+    lead = {lead.section: lead for lead in leads(scene, lambda image: shown)}["lamp"]
+    assert lead.offset == pytest.approx((0.5, 0.875, 0.0), abs=1.0 / 16.0)
+
+
 def test_a_post_by_its_name_is_a_suspicion_with_its_top() -> None:
     points = np.array([[0, 0, 0], [2, 0, 0], [2, 7, 0], [0, 7, 0]], np.float32)
     part = node("mesh", transform=TRS((0.0, 1.0, 0.0)), meshes=[0])

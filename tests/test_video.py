@@ -147,10 +147,17 @@ class TestFiles:
         if not full.exists():
             pytest.skip("no /dev/full")
         path = tmp_path / "full.mp4"
-        VideoWriter(path, 24)._temporary.symlink_to(full)
+        video = VideoWriter(path, 24)
+        video._temporary.symlink_to(full)
         noise = np.random.default_rng(1).integers(0, 256, (256, 256, 3), np.uint8)
+
+        def fill() -> None:
+            with video:
+                for _ in range(3):
+                    video.add(noise)
+
         with pytest.raises(HdrusdError, match=r"full\.mp4: cannot be written"):
-            write(path, [noise] * 3)
+            fill()
         assert list(tmp_path.iterdir()) == []
 
 

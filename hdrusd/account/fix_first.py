@@ -1,7 +1,8 @@
 """What to fix first: the few things in which a converted scene is likely to be most wrong.
 
 Impact is a share of the scene times the decades (log10) by which it may be off. Lights count
-by flux, lumens of lamps and lux times the ground for what comes from afar; what glows, pi L A,
+by flux, lumens of lamps and lux on level ground times the ground for what comes from afar; what
+glows, pi L A,
 counts among all of both, for it is seen but lights nothing. Surfaces count by area. An estimate
 from a colour may be off by a decade, one by a lamp's class by half of that, a stated number
 without a source by a tenth.
@@ -16,9 +17,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from hdrusd.account.lights import FACTOR, group_name, group_pattern, grouped
-from hdrusd.account.reflectances import toml_entry, toml_table
+from hdrusd.account.lights import FACTOR, all_names, group_name, group_patterns, grouped
 from hdrusd.photometry.albedo import words
+from hdrusd.photometry.recipe_entry import toml_entry, toml_table
 
 Row = Mapping[str, Any]
 
@@ -119,7 +120,11 @@ class Scene:
     def flux(self, row: Row) -> float:
         """Lumens that a row of lights sends into the scene."""
         if row["kind"] in ("distant", "ambient"):
-            return float(row["value"] * (self.ground or self.diagonal**2))
+            # Where there is no ground, walls are what is lit, and they stand each their way.
+            lux, area = row["level_lux"], self.ground
+            if not self.ground:
+                lux, area = row["value"], self.diagonal**2
+            return float(lux * row["lamps"] * area)
         return float((row["flux_lm"] or 0.0) * row["lamps"])
 
     def glow(self, row: Row) -> float:
@@ -164,7 +169,7 @@ def _dark(scene: Scene) -> Iterator[Entry]:
 
 
 def _lights(scene: Scene) -> Iterator[Entry]:
-    names = sorted(row["name"] for row in scene.lights)
+    names = all_names(scene.lights)
     for group in grouped(scene.lights):
         row = group[0]
         share = _share(sum(map(scene.flux, group)), scene.lit)
@@ -174,7 +179,6 @@ def _lights(scene: Scene) -> Iterator[Entry]:
         unit = f"times {row['file']}" if row["unit"] == FACTOR else row["unit"]
         what = f"{group_name(group)}: {many}{value:g} {unit} by {row['rule'] or row['provenance']}"
         why = f"{_percent(share)} of the scene's light; {_TRUST[row['confidence']]}"
-        pattern = group_pattern(group, names)
         write: str | None
         if entry := _entry(row):
             write = None  # a second entry would not count, or lose what the first one says besides
@@ -183,13 +187,21 @@ def _lights(scene: Scene) -> Iterator[Entry]:
             why += "; full moon gives 0.25 lx"
             write = f"[ambient]\nilluminance = {value:g}"
         elif row["kind"] == "distant":
-            write = toml_table("light", pattern, illuminance=value, **_KEPT[row["confidence"]])
+            write = _tables(group, names, illuminance=value, **_KEPT[row["confidence"]])
         elif row["unit"] == FACTOR:
             stated = {} if row["flux_lm"] is None else {"lumens": round(row["flux_lm"])}
-            write = toml_table("light", pattern, ies="FILE", **stated)
+            write = _tables(group, names, ies="FILE", **stated)
         else:
-            write = toml_table("light", pattern, candela=value, **_KEPT[row["confidence"]])
+            write = _tables(group, names, candela=value, **_KEPT[row["confidence"]])
         yield Entry(share * _DECADES[row["confidence"]], what, why, PHOTOMETRY, write)
+
+
+def _tables(group: Sequence[Row], names: Sequence[str], **values: Any) -> str:
+    """Entries for a group of lights; of very many that share names with others the first."""
+    patterns = group_patterns(group, names)
+    tables = [toml_table("light", pattern, **values) for pattern in patterns[:MOST]]
+    more = [f"# and {len(patterns) - MOST} more like these"] if len(patterns) > MOST else []
+    return "\n".join([*tables, *more])
 
 
 def _held(scene: Scene) -> Iterator[Entry]:

@@ -8,11 +8,10 @@ that is called an emission map is a lamp that stays dark.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hdrusd.legacy.scene import Material, Texture
+from hdrusd.legacy.scene import Material
 from hdrusd.photometry.albedo import words
 from hdrusd.usd.material import Surface
 
@@ -20,7 +19,12 @@ from hdrusd.usd.material import Surface
 CLASSES = ("reflectance", "emission", "opacity", "data", "lookup", "unused")
 
 #: Fields of a material with textures, by class; what is in any other field is data.
-_FIELDS = {"diffuse_map": "reflectance", "emission_map": "emission", "opacity_map": "opacity"}
+_FIELDS = {
+    "diffuse_map": "reflectance",
+    "specular_map": "reflectance",
+    "emission_map": "emission",
+    "opacity_map": "opacity",
+}
 
 #: Words of names by which an unused picture shows what it was meant for.
 _MEANT = {
@@ -51,7 +55,7 @@ def image_rows(
     triples = zip(materials, surfaces, areas, strict=True)
     for number, (material, surface, area) in enumerate(triples):
         share = area / total if total > 0.0 else 0.0
-        for name, texture in _textures(material):
+        for name, texture in material.maps().items():
             row = _row(rows, texture.image.name, str(texture.image.source))
             row["uses"].add(_use(name, surface))
             row["missing"] |= texture.image.missing
@@ -90,19 +94,12 @@ def _row(rows: dict[str, dict[str, Any]], name: str, place: str) -> dict[str, An
     return rows.setdefault(name, empty)
 
 
-def _textures(material: Material) -> Iterator[tuple[str, Texture]]:
-    """Every field of a material that holds a texture."""
-    for field in fields(material):
-        value = getattr(material, field.name)
-        if isinstance(value, Texture):
-            yield field.name, value
-
-
 def _use(name: str, surface: Surface) -> str:
     """What a field's texture is used for; the glass of a lamp reflects nothing."""
     use = _FIELDS.get(name, "data")
-    if use == "reflectance" and surface.replaces_reflection:
-        return "emission" if surface.emission_map is not None else "unused"
+    if use in ("reflectance", "data") and surface.replaces_reflection:
+        shows = name == "diffuse_map" and surface.emission_map is not None
+        return "emission" if shows else "unused"
     if use == "emission" and not any(surface.emission):
         return "unused"
     return use

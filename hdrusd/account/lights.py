@@ -20,8 +20,8 @@ UNITS = {"point": "cd", "spot": "cd", "distant": "lx", "ambient": "lx"}
 #: Of a light with a photometric file.
 FACTOR = "times the file"
 
-#: The last of all characters; the digits, each one.
-_LAST, _DIGITS = chr(0x10FFFF), tuple("0123456789")
+#: The last of all characters.
+_LAST = chr(0x10FFFF)
 
 
 def light_row(
@@ -31,10 +31,13 @@ def light_row(
     source: Light | None = None,
     *,
     place: str = "",
+    node: str = "",
     places: int = 1,
     file_flux: float | None = None,
+    level: float = 1.0,
 ) -> dict[str, Any]:
-    """One row. ``places``: at which it stands; ``file_flux``: lm of its file times its factor.
+    """One row. ``node``: its name; ``places``: at which it stands; ``file_flux``: lm of its file
+    times its factor; ``level``: of what comes from afar the share that a level ground gets.
 
     ``value`` and ``luminance_cd_m2`` are of one lamp, ``flux_lm`` of one too; ``lamps`` is how
     many there are.
@@ -46,6 +49,7 @@ def light_row(
         "name": name,
         "path": path,
         "place": place,
+        "node": node,
         "kind": light.kind,
         "lamps": places * (1 if source is None else source.lamps),
         "value": light.intensity,
@@ -54,6 +58,7 @@ def light_row(
         "radius_m": light.radius if local else None,
         "luminance_cd_m2": sphere_luminance(light.intensity, light.radius) if seen else None,
         "flux_lm": lumens,
+        "level_lux": None if local else light.intensity * level,
         "provenance": light.provenance,
         "rule": light.rule,
         "source": light.source,
@@ -96,27 +101,44 @@ def group_name(group: Sequence[Mapping[str, Any]]) -> str:
     return first if first == last else f"{first} ... {last}"
 
 
-def group_pattern(group: Sequence[Mapping[str, Any]], everything: Sequence[str]) -> str:
-    """The shell pattern of the photometry file that fits a group and nothing else.
+def all_names(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What patterns of the photometry file may fit, sorted: names of lights and of their nodes."""
+    return sorted(name for row in rows for name in _names(row))
 
-    ``everything``: the names of all lights, sorted. Only the first of the group where names cannot
-    tell it from others.
+
+def group_patterns(group: Sequence[Mapping[str, Any]], everything: Sequence[str]) -> list[str]:
+    """Shell patterns of the photometry file that fit a group and nothing else, few if that can be.
+
+    ``everything``: ``all_names``. Lights that share a name with others go by their paths.
     """
     names = sorted({str(row["name"]) for row in group})
-    if len(names) == 1:
-        return escape(names[0])
-    pairs = zip(names[0], names[-1], strict=False)
-    same = "".join(a for a, _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
-    stem = same.rstrip("0123456789")
-    begins = _between(everything, stem, stem + _LAST)
-    if stem and begins == len(group):
-        return f"{escape(stem)}*"
-    numbered = all(name[len(stem) : len(stem) + 1] in _DIGITS for name in names)
-    if stem and numbered and _between(everything, stem + "0", stem + ":") == len(group):
-        return f"{escape(stem)}[0-9]*"
-    return escape(names[0])
+    if len(names) > 1:
+        pairs = zip(names[0], names[-1], strict=False)
+        same = "".join(a for a, _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
+        stem = same.rstrip("0123456789")
+        if stem and _only(group, everything, stem, stem + _LAST):
+            return [f"{escape(stem)}*"]
+        if stem and _only(group, everything, stem + "0", stem + ":"):
+            return [f"{escape(stem)}[0-9]*"]
+    by_name: dict[str, list[Mapping[str, Any]]] = {}
+    for row in group:
+        by_name.setdefault(str(row["name"]), []).append(row)
+    found: list[str] = []
+    for name, rows in by_name.items():
+        if _only(rows, everything, name, name + "\0"):
+            found.append(escape(name))
+        else:
+            found += [escape(row["path"]) for row in rows]
+    return found
 
 
-def _between(names: Sequence[str], first: str, end: str) -> int:
-    """How many of sorted names stand from ``first`` up to ``end``."""
-    return bisect_left(names, end) - bisect_left(names, first)
+def _names(row: Mapping[str, Any]) -> set[str]:
+    return {str(row["name"]), str(row["node"])} - {""}
+
+
+def _only(
+    rows: Sequence[Mapping[str, Any]], everything: Sequence[str], first: str, end: str
+) -> bool:
+    """Whether what stands from ``first`` up to ``end`` among sorted names is all of these rows."""
+    own = [sum(first <= name < end for name in _names(row)) for row in rows]
+    return all(own) and sum(own) == bisect_left(everything, end) - bisect_left(everything, first)

@@ -5,18 +5,17 @@ A doubt is a finding and changes nothing: the photometry file is where a person 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
-from glob import escape
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.account.wear import Worn, texels
+from hdrusd.account.wear import Worn
 from hdrusd.errors import SourceRef
 from hdrusd.legacy.scene import Image, Material
+from hdrusd.legacy.texels import texels
 from hdrusd.photometry.albedo import (
     Doubt,
     Reflectance,
@@ -26,6 +25,7 @@ from hdrusd.photometry.albedo import (
     surface_class,
 )
 from hdrusd.photometry.baked import baked_lamps, baked_shadow
+from hdrusd.photometry.recipe_entry import toml_entry
 from hdrusd.report import Kind, Report
 from hdrusd.units import LUMINANCE_WEIGHTS
 from hdrusd.usd.material import Surface
@@ -187,19 +187,6 @@ class Reflectances:
             "text": text,
             "write": None,
         }
-
-
-def toml_entry(section: str, name: str, **values: Any) -> str:
-    """An entry of the photometry file for the thing of exactly this name."""
-    return toml_table(section, escape(name), **values)
-
-
-def toml_table(section: str, pattern: str, **values: Any) -> str:
-    """An entry of the photometry file; JSON's strings, lists and numbers are TOML's too."""
-    pairs = {"match": pattern} | values
-    lines = [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in pairs.items()]
-    # The one character that JSON lets stand and TOML does not.
-    return "\n".join([f"[[{section}]]", *lines]).replace("\x7f", "\\u007f")
 
 
 def _metallic(material: Material) -> float:

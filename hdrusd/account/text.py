@@ -12,6 +12,9 @@ from hdrusd.errors import one_line
 #: Rows of lights and entries of what to fix that are shown; the report has all.
 LIGHTS, ENTRIES = 8, 5
 
+#: Codes of findings that are shown of a batch.
+CODES = 8
+
 #: Columns below which and above which a line is not set.
 _NARROWEST, _WIDEST = 60, 120
 
@@ -29,16 +32,39 @@ def summary(document: Mapping[str, Any], columns: int) -> list[str]:
     return [_cut(line, width) for line in lines]
 
 
+def batch_summary(document: Mapping[str, Any], columns: int) -> list[str]:
+    """As ``summary``, of ``batch_document``."""
+    width = min(max(columns, _NARROWEST), _WIDEST)
+    totals = document["totals"]
+    lines = [document["summary"]]
+    lines += [
+        f"  {row['kind']}: {row['code']}: {row['findings']} in {_files(row['files'])}"
+        for row in document["findings_by_code"][:CODES]
+    ]
+    if len(document["findings_by_code"]) > CODES:
+        lines.append(f"  and {len(document['findings_by_code']) - CODES} more codes; {_MORE}")
+    lines += [f"{u['place']}: {u['pattern']}: {u['text']}" for u in document["unused_patterns"]]
+    if totals["converted"]:
+        lines += [_sum_of_lights(totals), *_surfaces(totals)]
+        entries = [
+            {**entry, "what": f"{_files(entry['files'])}: {entry['what']}"}
+            for entry in document["fix_first"]
+        ]
+        lines += _fixes(entries, width)
+    return [_cut(line, width) for line in lines]
+
+
+def _files(count: int) -> str:
+    return f"{count} file{'s' if count > 1 else ''}"
+
+
 def _lights(
     rows: Sequence[Mapping[str, Any]], totals: Mapping[str, Any], width: int
 ) -> Iterator[str]:
     if not rows:
         yield "lights: none"
         return
-    lumens = totals["flux_lm"]
-    trust = ", ".join(f"{n} {c}" for c, n in totals["lamps_by_confidence"].items())
-    flux = "" if lumens is None else f", {lumens:.4g} lm"
-    yield f"lights: {totals['lamps']}{flux}; confidence: {trust}"
+    yield _sum_of_lights(totals)
     groups = sorted(grouped(rows), key=_strength, reverse=True)
     cells = [("", "source says", "rule", "result", "confidence"), *map(_cells, groups[:LIGHTS])]
     widths = [max(len(row[i]) for row in cells) for i in range(5)]
@@ -51,6 +77,21 @@ def _lights(
         yield f"  {'  '.join(parts)}".rstrip()
     if len(groups) > LIGHTS:
         yield f"  and {sum(map(len, groups[LIGHTS:]))} more; {_MORE}"
+
+
+def _sum_of_lights(totals: Mapping[str, Any]) -> str:
+    if not totals["lamps"]:
+        return "lights: none"
+    lumens = totals["flux_lm"]
+    trust = ", ".join(f"{n} {c}" for c, n in totals["lamps_by_confidence"].items())
+    flux = "" if lumens is None else f", {lumens:.4g} lm"
+    return f"lights: {lights_and_skies(totals)}{flux}; confidence: {trust}"
+
+
+def lights_and_skies(totals: Mapping[str, Any]) -> str:
+    """``4, skies: 1``: how many lights there are, and what else lights the scene."""
+    skies = totals["skies"]
+    return f"{totals['lamps'] - skies}" + (f", skies: {skies}" if skies else "")
 
 
 def _strength(group: Sequence[Mapping[str, Any]]) -> float:

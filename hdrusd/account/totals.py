@@ -31,6 +31,7 @@ def totals(
     classes = Counter(row["class"] for row in images)
     return {
         "lamps": sum(row["lamps"] for row in lights),
+        "skies": sum(row["lamps"] for row in lights if row["kind"] == "ambient"),
         "lamps_by_rule": dict(by_rule.most_common()),
         "lamps_by_confidence": {c: by_confidence[c] for c in LEVELS if by_confidence[c]},
         "flux_lm": float(sum(known)) if known else None,

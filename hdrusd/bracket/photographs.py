@@ -15,6 +15,7 @@ import OpenImageIO as oiio
 
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.images import check_size
+from hdrusd.input_file import check_input
 from hdrusd.report import Kind, Report
 
 #: Names under which OpenImageIO gives what Exif calls PhotographicSensitivity.
@@ -41,8 +42,7 @@ class Photograph:
     """
 
     def __init__(self, path: Path) -> None:
-        if not path.is_file():
-            raise InputError(path, "no such image")
+        check_input(path)
         config = oiio.ImageSpec()
         config.attribute("oiio:UnassociatedAlpha", 1)
         opened = oiio.ImageInput.open(str(path), config)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from hdrusd.errors import HdrusdError, InputError, ParameterError, UnknownNameError
+from hdrusd.input_file import check_input
 
 #: A profile is a few lines; more than this many bytes is another file.
 _LARGEST = 65536
@@ -92,8 +93,7 @@ def named(table: Path) -> Mapping[str, Mapping[str, Any]]:
 
 def _read(kind: str, path: Path, rules: Rules) -> dict[str, Value]:
     """The profile that a user's file holds. Raises InputError."""
-    if not path.is_file():
-        raise InputError(path, f"no such file; want a {kind} profile")
+    check_input(path)
     with path.open("rb") as file:
         data = file.read(_LARGEST + 1)
     if len(data) > _LARGEST:

@@ -115,9 +115,12 @@ class LightPass:
         glossy: tuple[str, ...] = ()
         if not alike and any(map(shines, scene.materials)):
             glossy = ("GLOSSY",) if dielectric is None else ("GLOSSY", "DIELECTRIC")
+            if dielectric is None and "g_extra" in layers:  # a coat shines on a matt surface too
+                glossy += ("COATED",)
         bounds = self.tile_bounds(layers, glossy)
         if alike:
             bounds = replace(bounds, gloss=np.full_like(bounds.gloss, 2))
+        bumped = any(material.normal_map is not None for material in scene.materials)
         regions = self._regions(table, bounds, scene.camera)
         ctx = self.ctx
         frame.use()
@@ -144,6 +147,7 @@ class LightPass:
                     names += ["COATED"] if "g_extra" in layers else []
                     names += ["DIELECTRIC"] if dielectric is not None else []
                 names += ["ORTHOGRAPHIC"] if scene.camera.orthographic else []
+                names += ["BUMPED"] if bumped else []
                 self._add_classes(table, region, names, uniforms, bind)
         finally:
             table.texture.release()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,16 @@ import numpy as np
 
 from hdrusd.errors import SourceRef
 from hdrusd.importers import assimp_library as ai
-from hdrusd.legacy.scene import RGB, Image, Material, Texture, UVTransform, Wrap
+from hdrusd.legacy.scene import (
+    GREEN_UP,
+    RGB,
+    Image,
+    Material,
+    Texture,
+    UVTransform,
+    Wrap,
+    normal_texels,
+)
 from hdrusd.report import Kind, Report
 
 #: (name of the key, role, number); the role is 0 but for textures.
@@ -23,8 +32,8 @@ _UNLIT = 9  # aiShadingMode_NoShading
 _TYPES = {1: "<f4", 2: "<f8", 4: "<i4"}
 _STRING_TYPE = 3
 #: Roles of textures (aiTextureType): the first given of each counts.
-_ROLES = {"diffuse_map": (1, 12), "emission_map": (4, 14), "opacity_map": (8,)}
-_NAMES = {2: "specular", 3: "ambient", 5: "height", 6: "normal", 7: "shininess", 10: "light"}
+_ROLES = {"diffuse_map": (1, 12), "emission_map": (4, 14), "opacity_map": (8,), "normal_map": (6,)}
+_NAMES = {2: "specular", 3: "ambient", 5: "height", 7: "shininess", 10: "light"}
 _WRAPS: tuple[Wrap, ...] = ("repeat", "clamp", "mirror", "black")
 _USE_ALPHA = 0x2  # aiTextureFlags
 
@@ -67,6 +76,7 @@ class MaterialReader:
             diffuse_map=maps.get("diffuse_map"),
             emission_map=maps.get("emission_map"),
             opacity_map=maps.get("opacity_map"),
+            normal_map=maps.get("normal_map"),
             alpha_mode="blend" if clear else "opaque",
             two_sided=bool(_integer(said, ("$mat.twosided", 0, 0))),
             lit=_integer(said, ("$mat.shadingm", 0, 0)) != _UNLIT,
@@ -83,6 +93,11 @@ class MaterialReader:
                     texture = self._texture(said, role, number, place, name)
                     made[slot] = texture
                     del files[role, number]
+        normal = made.get("normal_map")
+        if normal is not None:
+            scale, bias = normal_texels()
+            made["normal_map"] = replace(normal, scale=scale, bias=bias)
+            self.report.add(Kind.ASSUMED, "normal-green", place, name, GREEN_UP)
         for role, number in sorted(files):
             what = _NAMES.get(role, f"role {role}")
             text = f"{files[role, number]}: {what} texture {number}; left out"

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.importers.collada_xml import Element
 from hdrusd.importers.importer import Limits
+from hdrusd.importers.number_text import decimals, wholes
 from hdrusd.report import Kind, Report
 
 Doubles = npt.NDArray[np.float64]
@@ -129,9 +130,8 @@ class Document:
         text = element.text if text is None else text
         if "," in text:
             text = self._without_commas(element, text)
-        try:
-            values: Doubles = np.fromstring(text, np.float64, sep=" ")
-        except (ValueError, DeprecationWarning):
+        values = decimals(text.encode())
+        if values is None:
             words = text.split()
             values = np.array([_number(word) for word in words], np.float64)
             if bad := sum(_NUMBER.fullmatch(word) is None for word in words):
@@ -152,12 +152,11 @@ class Document:
 
     def indices(self, element: Element) -> npt.NDArray[np.int64]:
         """All whole numbers of an element's text; -1 for what cannot be an index."""
-        try:  # half the time of numbers; what does not fit comes back as the largest
-            whole = np.fromstring(element.text, np.int64, sep=" ")
-        except (ValueError, DeprecationWarning):
-            pass
-        else:
-            return np.where((whole >= 0) & (whole <= _INDEX_END), whole, -1)
+        whole = wholes(element.text.encode())
+        if whole is not None:
+            if whole.size and (whole.min() < 0 or whole.max() > _INDEX_END):
+                whole[(whole < 0) | (whole > _INDEX_END)] = -1
+            return whole
         values = self.numbers(element)
         bad = ~((values >= 0.0) & (values <= _INDEX_END))  # NaN compares false
         if bad.any():

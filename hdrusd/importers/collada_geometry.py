@@ -168,7 +168,7 @@ class GeometryReader:
         attribute = _Attributes(document, self._sources, place, name, faces.corners, used)
         normals = attribute.read([i for i in rest if i.semantic == "NORMAL"][:1], 3, 3)
         if normals is not None:
-            normals = self._mended(place, name, normals, points[numbers], compact, faces.counts)
+            normals = self._mended(place, name, normals, points, numbers, compact, faces.counts)
         coordinates = sorted((i for i in rest if i.semantic == "TEXCOORD"), key=lambda i: i.number)
         sets = {i.number: i for i in reversed(coordinates)}
         uvs = {}
@@ -203,6 +203,8 @@ class GeometryReader:
         numbers = faces.corners[:, offset]
         there = (numbers >= 0) & (numbers < len(points))
         finite: Flags = np.all(np.abs(points) <= LARGEST, axis=1)  # a NaN compares false
+        if there.all() and finite.all():
+            return np.ones(len(faces.counts), np.bool_)
         whole = there.copy()
         whole[there] = finite[numbers[there]]
         starts = np.cumsum(faces.counts) - faces.counts
@@ -221,15 +223,18 @@ class GeometryReader:
         name: str,
         normals: tuple[Floats, Interpolation],
         points: Doubles,
-        numbers: npt.NDArray[np.int32],
+        numbers: Longs,
+        compact: npt.NDArray[np.int32],
         counts: Longs,
     ) -> tuple[Floats, Interpolation]:
         """Normals of length 0 get that of their face, then at each corner.
 
-        points: (c, 3) of the corners; numbers: (c,) the rows of normals for each point.
+        numbers: (c,) the rows of ``points`` at the corners; compact: those of normals for each
+        point.
         """
         values, interpolation = normals
-        bad: Flags = ~np.any(values, axis=1)
+        none = values == 0.0
+        bad: Flags = none[:, 0] & none[:, 1] & none[:, 2]
         if not bad.any():
             return normals
         text = f"{int(bad.sum())} of {len(bad)} normals are missing, 0 or not finite"
@@ -237,8 +242,8 @@ class GeometryReader:
             Kind.REPLACED, "mesh-normals", place, name, f"{text}; the face's own is used"
         )
         if interpolation == "vertex":
-            values, bad = values[numbers], bad[numbers]
-        facing = np.repeat(face_normals(points, counts), counts, axis=0)
+            values, bad = values[compact], bad[compact]
+        facing = np.repeat(face_normals(points[numbers], counts), counts, axis=0)
         return np.where(bad[:, None], facing, values).astype(np.float32), "faceVarying"
 
     def _note_lost(
@@ -290,6 +295,10 @@ class _Attributes:
         vertex = self._is_vertex(given)
         if vertex:
             rows = self.used
+        where: Interpolation = "vertex" if vertex else "faceVarying"
+        sound = table.shape[1] >= width and bool((np.abs(table[:, :width]) <= LARGEST).all())
+        if sound and len(rows) and rows.min() >= 0 and rows.max() < len(table):
+            return table[:, :width].astype(np.float32).take(rows, axis=0), where
         bad = (rows < 0) | (rows >= len(table))
         if bad.all():
             self._dropped(given, f"no index within its {len(table)} rows")
@@ -303,7 +312,7 @@ class _Attributes:
             self.document.note(
                 Kind.INVALID, "attribute-not-finite", self.place, self.name, f"{text}; 0 is used"
             )
-        return values, "vertex" if vertex else "faceVarying"
+        return values, where
 
     def _is_vertex(self, given: Input) -> bool:
         """Whether the input is read by the points' own numbers."""

@@ -13,7 +13,7 @@ from typing import Any, Literal
 from hdrusd.importers.collada_document import Document, Doubles, extras, named
 from hdrusd.importers.collada_textures import TextureReader, TextureUse
 from hdrusd.importers.collada_xml import Element
-from hdrusd.legacy.scene import RGB, Material
+from hdrusd.legacy.scene import GREEN_UP, RGB, Material, normal_texels
 from hdrusd.report import Kind
 from hdrusd.units import LUMINANCE_WEIGHTS
 
@@ -121,11 +121,13 @@ class _Shader:
             specular = (0.0, 0.0, 0.0)
         shininess = self._shininess()
         alpha, opacity_use = self._opacity()
-        lost += self._lost_terms()
+        bump = self._normal_bump()
+        lost += self._lost_terms(bump)
         if lost:
             text = f"{', '.join(lost)} dropped: no home"
             self._note(Kind.DROPPED, "material-part", text)
-        uses = {"diffuse_map": diffuse_use, "emission_map": emission_use}
+        normal_use = None if bump is None else self._normal_map(bump)
+        uses = {"diffuse_map": diffuse_use, "emission_map": emission_use, "normal_map": normal_use}
         maps = {slot: use for slot, use in uses.items() if use is not None}
         if opacity_use is not None:
             maps["opacity_map"] = opacity_use
@@ -144,6 +146,7 @@ class _Shader:
             diffuse_map=None if diffuse_use is None else diffuse_use.texture,
             emission_map=None if emission_use is None else emission_use.texture,
             opacity_map=None if opacity_use is None else opacity_use.texture,
+            normal_map=None if normal_use is None else normal_use.texture,
             alpha_mode=alpha_mode,
             two_sided=both is None or self.document.value(both, 1.0) != 0.0,
             lit=kind != "constant",
@@ -261,8 +264,31 @@ class _Shader:
             amount = 1.0
         return amount, TextureUse(replace(read.texture, channel=channel), read.channel)
 
-    def _lost_terms(self) -> list[str]:
-        """Terms of the shader without a home that change what is seen."""
+    def _holders(self) -> list[Element]:
+        """Where an ``extra`` of the shader may stand."""
+        technique = self.profile.child("technique")
+        holders = [self.effect, self.profile, self.shader]
+        return holders if technique is None else [*holders, technique]
+
+    def _normal_bump(self) -> Element | None:
+        """The ``bump`` of FCOLLADA and OpenCOLLADA that says it is no height: of NORMALMAP."""
+        for holder in self._holders():
+            found = extras(holder).get("bump")
+            if found is not None and found.get("bumptype").upper() == "NORMALMAP":
+                return found if found.child("texture") is not None else None
+        return None
+
+    def _normal_map(self, bump: Element) -> TextureUse | None:
+        use = bump.child("texture")
+        read = None if use is None else self.textures.read(use, self._params(), self.name)
+        if read is None:
+            return None
+        self._note(Kind.ASSUMED, "normal-green", GREEN_UP)
+        scale, bias = normal_texels()
+        return TextureUse(replace(read.texture, scale=scale, bias=bias), read.channel)
+
+    def _lost_terms(self, kept: Element | None) -> list[str]:
+        """Terms of the shader without a home that change what is seen, but for ``kept``."""
         lost = []
         for term in self.shader.children:
             if term.tag in _READ or term.tag in ("extra", "index_of_refraction"):
@@ -275,11 +301,9 @@ class _Shader:
                 if term.tag == "reflectivity" or not shows:
                     continue
             lost.append(term.tag[:40])
-        technique = self.profile.child("technique")
-        holders = [self.effect, self.profile, self.shader]
-        for holder in holders if technique is None else [*holders, technique]:
+        for holder in self._holders():
             for name, leaf in extras(holder).items():
-                if leaf.child("texture") is not None:
+                if leaf.child("texture") is not None and leaf is not kept:
                     lost.append(f"texture of {name[:40]}")
         return sorted(set(lost))
 

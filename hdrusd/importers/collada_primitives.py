@@ -42,6 +42,8 @@ class Faces:
 
     def keep(self, good: npt.NDArray[np.bool_]) -> Faces:
         """Only the faces that are ``good``, (f,)."""
+        if good.all():
+            return self
         return Faces(self.counts[good], self.corners[np.repeat(good, self.counts)])
 
 

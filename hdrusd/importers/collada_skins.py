@@ -112,6 +112,10 @@ class SkinReader:
         point, share, index = point[order], share[order], pairs[order, joint.offset]
         rank = np.arange(len(point)) - np.searchsorted(point, point)
         kept = rank < MOST_INFLUENCES
+        if held := len(np.unique(point[~kept & (share > 0.0)])):
+            text = f"{held} of {len(counts)} points are held by more than {MOST_INFLUENCES} "
+            text += "joints; the strongest are kept"
+            document.note(Kind.DROPPED, "skin-weights", place, "", text)
         most = int(rank[kept].max(initial=0)) + 1
         indices = np.zeros((len(counts), most), np.int64)
         weights = np.zeros((len(counts), most))

@@ -10,15 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from hdrusd.importers.fbx_document import Document, own_properties, user_properties
 from hdrusd.importers.fbx_held import Held
 from hdrusd.importers.fbx_textures import TextureReader
-from hdrusd.legacy.scene import RGB, Material, Texture
+from hdrusd.importers.refraction import index_of
+from hdrusd.legacy.scene import GREEN_UP, RGB, Material, Texture, normal_texels
 from hdrusd.report import Kind
 
 #: ufbx's shader types.
-_LAMBERT, _MAX_PHYSICAL, _SPECULAR_GLOSS, _BLENDER = 1, 5, 7, 11
+_LAMBERT, _MAX_PHYSICAL, _SPECULAR_GLOSS, _GLTF, _BLENDER = 1, 5, 7, 8, 11
 #: Words of FBX for the fields of the record; those of the oldest versions too.
 _WORDS = {
     "ambient": ("AmbientColor", "Ambient"),
@@ -32,6 +34,8 @@ _LUMINANCE = "3dsMax|Parameters|emit_luminance"
 _BLACK: RGB = (0.0, 0.0, 0.0)
 #: Of a surface whose roughness is a picture, and which states a number that means nothing.
 _MIDDLE = 0.5
+#: Beyond it a normal map's strength says nothing more, and float32 would end.
+_STRONGEST = 1e6
 #: Index of refraction of a UsdPreviewSurface.
 _IOR = 1.5
 
@@ -82,7 +86,7 @@ class _Reader:
             specular = self._color("fbx.specular_color", "fbx.specular_factor", _BLACK)
             shininess = max(self._number("fbx.specular_exponent", 0.0), 0.0)
             made = replace(made, specular=specular, shininess=shininess)
-        made = self._transparent(made, own)
+        made = replace(self._transparent(made, own), normal_map=self._normal())
         if material.features.pbr.enabled:
             made = self._physical(made)
         if material.features.double_sided.is_explicit:
@@ -148,6 +152,30 @@ class _Reader:
             self.kept.add(made.image.name)
         return made
 
+    def _data(self, path: str) -> Texture | None:
+        """The picture of a number: its red."""
+        found = self._texture(path) if self._worn(path) is not None else None
+        return None if found is None else replace(found, channel="r")
+
+    def _normal(self) -> Texture | None:
+        """What NormalMap names; Bump, and bump_map of 3ds Max, may be heights.
+
+        Blender writes the strength s of the mixture n' = (1 - s) z + s n as BumpFactor.
+        """
+        paths = ["fbx.normal_map"]
+        paths += ["pbr.normal_map"] if int(self.material.shader_type) == _GLTF else []
+        path = next((p for p in paths if self._worn(p) is not None), None)
+        found = None if path is None else self._texture(path)
+        if found is None:
+            return None
+        scale, bias = normal_texels()
+        if self.document.application().startswith("Blender"):
+            s = min(max(self._number("fbx.bump_factor", 1.0), 0.0), _STRONGEST)
+            scale, bias = (2.0 * s, 2.0 * s, 2.0 * s, 1.0), (-s, -s, 1.0 - 2.0 * s, 0.0)
+        elif path == "fbx.normal_map":
+            self._note(Kind.ASSUMED, "normal-green", GREEN_UP)
+        return replace(found, scale=scale, bias=bias)
+
     # -- what lets light through -----------------------------------------------------------------
 
     def _transparent(self, made: Material, own: Mapping[str, Held]) -> Material:
@@ -203,16 +231,29 @@ class _Reader:
         Blender's exporter hides its numbers in a Phong, whose record stays.
         """
         kind = int(self.material.shader_type)
-        roughness = self._roughness()
+        roughness, roughness_map = self._roughness("roughness", "glossiness", _MIDDLE)
         metallic = min(max(self._number("pbr.metalness", 0.0), 0.0), 1.0)
+        metallic_map = self._data("pbr.metalness")
         pbr = {"roughness": roughness, "metallic": metallic}
+        made = replace(
+            made,
+            roughness_map=roughness_map,
+            metallic_map=metallic_map,
+            occlusion_map=self._data("pbr.ambient_occlusion"),
+        )
         if kind == _BLENDER:
             return replace(made, pbr=pbr)
         specular = self._reflectance(kind)
-        if kind == _SPECULAR_GLOSS or (metallic == 0.0 and specular is not None):
+        dull = metallic == 0.0 and metallic_map is None
+        if kind == _SPECULAR_GLOSS or (dull and specular is not None):
             pbr = {"glossiness": 1.0 - roughness}
+        elif specular is not None and max(specular) == min(specular):
+            pbr["ior"] = index_of(specular[0])
+        coat, maps = self._coat()
+        pbr |= coat
         made = replace(
             made,
+            **maps,
             specular=specular if specular is not None and "glossiness" in pbr else _BLACK,
             pbr=pbr,
             diffuse=self._color("pbr.base_color", "pbr.base_factor", made.diffuse),
@@ -245,14 +286,34 @@ class _Reader:
             None if max(abs(c - usual) for c in (red, green, blue)) < 1e-3 else (red, green, blue)
         )
 
-    def _roughness(self) -> float:
-        if self._worn("pbr.roughness") is not None or self._worn("pbr.glossiness") is not None:
-            text = f"roughness is a picture, which has no home; {_MIDDLE:g} is used"
+    def _roughness(self, rough: str, glossy: str, default: float) -> tuple[float, Texture | None]:
+        """The number of a map ``rough``, or one minus that of ``glossy``, and its picture."""
+        direct, turned = self._data(f"pbr.{rough}"), self._data(f"pbr.{glossy}")
+        if direct is not None:
+            return default, direct
+        if turned is not None:
+            return default, replace(turned, scale=(-1.0,) * 4, bias=(1.0,) * 4)
+        if self._worn(f"pbr.{rough}") is not None or self._worn(f"pbr.{glossy}") is not None:
+            text = f"{rough} is a picture that cannot be shown; {default:g} is used"
             self._note(Kind.ASSUMED, "fbx-roughness", text)
-            return _MIDDLE
-        if not self._map("pbr.roughness").has_value and self._map("pbr.glossiness").has_value:
-            return 1.0 - min(max(self._number("pbr.glossiness", 0.5), 0.0), 1.0)
-        return min(max(self._number("pbr.roughness", _MIDDLE), 0.0), 1.0)
+            return default, None
+        if not self._map(f"pbr.{rough}").has_value and self._map(f"pbr.{glossy}").has_value:
+            return 1.0 - min(max(self._number(f"pbr.{glossy}", 1.0 - default), 0.0), 1.0), None
+        return min(max(self._number(f"pbr.{rough}", default), 0.0), 1.0), None
+
+    def _coat(self) -> tuple[dict[str, float], dict[str, Any]]:
+        """The numbers of a clear coat and its maps, by the fields of ``Material``."""
+        amount = min(max(self._number("pbr.coat_factor", 0.0), 0.0), 1.0)
+        coat_map = self._data("pbr.coat_factor")
+        if amount == 0.0 and coat_map is None:
+            return {}, {}
+        roughness, rough_map = self._roughness("coat_roughness", "coat_glossiness", 0.0)
+        ior = self._number("pbr.coat_ior", _IOR)
+        if abs(((ior - 1.0) / (ior + 1.0)) ** 2 - 0.04) > 5e-3:
+            text = f"clear coat of ior {ior:g} reflects 0.04 at normal incidence, as of 1.5"
+            self._note(Kind.REPLACED, "clearcoat-ior", text)
+        maps = {"clearcoat_map": coat_map, "clearcoat_roughness_map": rough_map}
+        return {"clearcoat": amount, "clearcoat_roughness": roughness}, maps
 
     def _luminance(self, made: Material) -> Material:
         """3ds Max's Physical Material states cd/m2: weight times colour times luminance."""

@@ -20,8 +20,11 @@ from hdrusd.report import Kind, Report
 EXTENSIONS = frozenset(
     {
         EXTENSION,
+        "KHR_materials_clearcoat",
         "KHR_materials_emissive_strength",
+        "KHR_materials_ior",
         "KHR_materials_pbrSpecularGlossiness",
+        "KHR_materials_specular",
         "KHR_materials_unlit",
         "KHR_mesh_quantization",
         "KHR_texture_basisu",

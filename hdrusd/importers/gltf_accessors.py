@@ -53,9 +53,9 @@ class Accessors:
 
         Raises InputError when the accessor is broken or reaches past its bytes.
         """
-        if index not in self._floats:
-            self._floats[index] = self._to_floats(index)
-        values = self._floats[index]
+        values = self._floats.get(index)
+        if values is None:
+            values = self._floats[index] = self._to_floats(index)
         if values.shape[1] not in widths:
             item = self._document.table("accessors")[index]
             wanted = " or ".join(str(width) for width in widths)
@@ -113,7 +113,9 @@ class Accessors:
         item = self._document.table("accessors")[index]
         values = self._elements(item)
         if values.dtype.kind == "f":
-            return np.require(values, np.float32, ["C", "A"])
+            whole = values.flags.c_contiguous and values.flags.aligned
+            usual = whole and values.dtype == np.float32  # in this machine's order of bytes
+            return values if usual else np.require(values, np.float32, ["C", "A"])
         floats = values.astype(np.float32, order="C")
         if item.flag("normalized"):
             floats /= np.float32(np.iinfo(values.dtype).max)

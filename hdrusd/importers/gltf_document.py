@@ -53,9 +53,10 @@ class Document:
 
     def table(self, name: str) -> list[Item]:
         """The top-level array ``name``; an entry that is no object reads as an empty one."""
-        if name not in self._tables:
-            self._tables[name] = self.root.children(name)
-        return self._tables[name]
+        found = self._tables.get(name)
+        if found is None:
+            found = self._tables[name] = self.root.children(name)
+        return found
 
     def keep_going(self, error: InputError, code: str, thing: str, consequence: str) -> None:
         """Turn an error about one thing into a finding; the rest of the file is used."""
@@ -63,9 +64,12 @@ class Document:
         self.report.add(Kind.INVALID, code, error.source, one_line(thing), text)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Item:
-    """A JSON object and its place in the file, such as ``/nodes/3``."""
+    """A JSON object and its place in the file, such as ``/nodes/3``.
+
+    There are many of them, and a frozen one would take three times as long to make.
+    """
 
     document: Document
     place: str
@@ -174,9 +178,11 @@ class Item:
 
     def integer(self, key: str) -> int | None:
         """A whole number of at least 0, or None where it is missing or, with a finding, wrong."""
+        value = self.data.get(key)
+        if type(value) is int and value >= 0:
+            return value
         if key not in self.data:
             return None
-        value = self.data[key]
         if isinstance(value, float) and value.is_integer():
             value = int(value)
         if not isinstance(value, int) or isinstance(value, bool) or value < 0:
@@ -186,6 +192,9 @@ class Item:
 
     def index(self, key: str, table: str) -> int | None:
         """A number of an entry of the top-level array ``table``, or None as ``integer`` does."""
+        value = self.data.get(key)
+        if type(value) is int and 0 <= value < len(self.document.table(table)):
+            return value
         value = self.integer(key)
         if value is not None and value >= (size := len(self.document.table(table))):
             self._wrong(key, f"one of the {size} {table}", "it is not used")
@@ -220,8 +229,9 @@ class Item:
             self._wrong(key, "an array of objects", "it is not used")
             values = []
         items = []
+        above = f"{self.place}/{key}/"
         for position, value in enumerate(values):
-            place = f"{self.place}/{key}/{position}"
+            place = f"{above}{position}"
             if not isinstance(value, dict):
                 ref = SourceRef(self.document.source, place)
                 text = f"{reprlib.repr(value)}; want an object; it reads as an empty one"
@@ -286,7 +296,7 @@ def load(resolver: Resolver, report: Report) -> Document:
 
 def clean(text: str) -> str:
     """``text`` with lone surrogates, which no file name and no USD string can hold, as '?'."""
-    return text.encode("utf-8", "replace").decode("utf-8")
+    return text if text.isascii() else text.encode("utf-8", "replace").decode("utf-8")
 
 
 def one_line(text: str) -> str:

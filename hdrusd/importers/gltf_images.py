@@ -7,6 +7,8 @@ KHR_texture_transform, EXT_texture_webp and KHR_texture_basisu.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from typing import Literal
 from urllib.parse import unquote
 
 from hdrusd.errors import InputError
@@ -123,6 +125,18 @@ class Textures:
             text = "NEAREST filter; textures are filtered linearly"
             sampler.note(Kind.REPLACED, "sampler-nearest", text)
         return _wrap(sampler, "wrapS"), _wrap(sampler, "wrapT")
+
+
+def channel(
+    texture: Texture | None,
+    letter: Literal["r", "g", "b", "a"],
+    factor: float = 1.0,
+    offset: float = 0.0,
+) -> Texture | None:
+    """A texture as data: ``factor`` times one of its channels plus ``offset``."""
+    if texture is None:
+        return None
+    return replace(texture, channel=letter, scale=(factor,) * 4, bias=(offset,) * 4)
 
 
 def uv_set_name(index: int) -> str:

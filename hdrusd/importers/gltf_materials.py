@@ -3,20 +3,25 @@
 glTF 2.0 specification, section 3.9; KHR_materials_pbrSpecularGlossiness,
 KHR_materials_unlit, KHR_materials_emissive_strength. Emission is in cd/m2: that is the
 unit of ``emissiveFactor`` times texture (KHR_materials_emissive_strength, overview).
+What lies over or bends the highlight is in gltf_layers.py.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 from hdrusd.importers.gltf_document import Document, Item, one_line
-from hdrusd.importers.gltf_images import Textures
-from hdrusd.legacy.scene import RGB, Material, Texture
+from hdrusd.importers.gltf_images import Textures, channel
+from hdrusd.importers.gltf_layers import clearcoat, reflectance
+from hdrusd.legacy.scene import RGB, Material, Texture, normal_texels
 from hdrusd.report import Kind
 
 _READ_EXTENSIONS = {
+    "KHR_materials_clearcoat",
+    "KHR_materials_ior",
     "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_specular",
     "KHR_materials_unlit",
     "KHR_materials_emissive_strength",
 }
@@ -29,6 +34,9 @@ _PBR_FIELDS = {"metallic", "roughness"}
 #: Fields of the OpenGL record of which glTF knows nothing.
 _NOT_IN_GLTF = {"ambient", "specular", "shininess"}
 
+#: Beyond it a normal map's strength says nothing more, and float32 would end.
+_STRONGEST = 1e6
+
 
 @dataclass(slots=True)
 class _Surface:
@@ -39,7 +47,7 @@ class _Surface:
     specular: RGB
     pbr: dict[str, float]
     defaults: set[str] = field(default_factory=set)
-    dropped: list[str] = field(default_factory=list)
+    maps: dict[str, Texture | None] = field(default_factory=dict)  # by the fields of Material
 
 
 def read_materials(document: Document, textures: Textures) -> list[Material]:
@@ -70,9 +78,9 @@ def _material(item: Item, name: str, textures: Textures) -> Material:
     emission = _emission(item)
     if emission is None:
         surface.defaults.add("emission")
-    dropped = [k for k in ("normalTexture", "occlusionTexture") if k in item] + surface.dropped
-    if "extensions" in item:
-        dropped += sorted(set(item.child("extensions").data) - _READ_EXTENSIONS)
+    over = _relief(item, textures) | clearcoat(item, textures, surface.pbr)
+    maps: dict[str, Any] = surface.maps | over
+    dropped = sorted(set(item.child("extensions").data) - _READ_EXTENSIONS)
     if dropped:
         text = f"dropped: no home yet for {', '.join(one_line(part) for part in dropped)}"
         item.note(Kind.DROPPED, "material-part", text)
@@ -95,7 +103,23 @@ def _material(item: Item, name: str, textures: Textures) -> Material:
         pbr=surface.pbr,
         defaults=frozenset(surface.defaults),
         extras=item.extras(),
+        **maps,
     )
+
+
+def _relief(item: Item, textures: Textures) -> dict[str, Texture | None]:
+    """The normal map, and the occlusion 1 + strength (x - 1) of its map's red."""
+    normal, occlusion = (textures.get(item, f"{key}Texture") for key in ("normal", "occlusion"))
+    if normal is not None:
+        info = item.child("normalTexture")
+        strength = info.number("scale", 1.0, low=-_STRONGEST, high=_STRONGEST)
+        scale, bias = normal_texels(strength)
+        normal = replace(normal, scale=scale, bias=bias)
+    strength = item.child("occlusionTexture").number("strength", 1.0, low=0.0, high=1.0)
+    return {
+        "normal_map": normal,
+        "occlusion_map": channel(occlusion, "r", strength, 1.0 - strength),
+    }
 
 
 def _metallic(item: Item, textures: Textures) -> _Surface:
@@ -104,13 +128,26 @@ def _metallic(item: Item, textures: Textures) -> _Surface:
     defaults = _NOT_IN_GLTF | {name for name, key in keys.items() if key not in pbr}
     if "baseColorFactor" not in pbr:
         defaults |= {"diffuse", "alpha"}
+    numbers = {name: pbr.number(key, 1.0, low=0.0, high=1.0) for name, key in keys.items()}
+    packed = textures.get(pbr, "metallicRoughnessTexture")
+    maps = {
+        "metallic_map": channel(packed, "b", numbers["metallic"]),
+        "roughness_map": channel(packed, "g", numbers["roughness"]),
+    }
+    if numbers["metallic"] == 0.0:  # as many files say whose picture is occlusion and roughness
+        maps["metallic_map"] = None
+    specular, numbers = reflectance(item, numbers)
+    if specular is None:
+        specular = (0.0, 0.0, 0.0)
+    else:
+        defaults = defaults - {"specular"}
     return _Surface(
         base=_factor(pbr, "baseColorFactor", 4),
         base_map=textures.get(pbr, "baseColorTexture"),
-        specular=(0.0, 0.0, 0.0),
-        pbr={name: pbr.number(key, 1.0, low=0.0, high=1.0) for name, key in keys.items()},
-        defaults=defaults,
-        dropped=[key for key in ("metallicRoughnessTexture",) if key in pbr],
+        specular=specular,
+        pbr=numbers,
+        defaults=set(defaults),
+        maps=maps,
     )
 
 
@@ -123,13 +160,18 @@ def _glossy(item: Item, textures: Textures) -> _Surface:
     if "glossinessFactor" not in item:
         defaults.add("glossiness")
     red, green, blue = _factor(item, "specularFactor", 3)
+    gloss = item.number("glossinessFactor", 1.0, low=0.0, high=1.0)
+    shine = textures.get(item, "specularGlossinessTexture")  # its alpha is the glossiness
     return _Surface(
         base=_factor(item, "diffuseFactor", 4),
         base_map=textures.get(item, "diffuseTexture"),
         specular=(red, green, blue),
-        pbr={"glossiness": item.number("glossinessFactor", 1.0, low=0.0, high=1.0)},
+        pbr={"glossiness": gloss},
         defaults=defaults,
-        dropped=[key for key in ("specularGlossinessTexture",) if key in item],
+        maps={
+            "specular_map": shine,
+            "roughness_map": channel(shine, "a", -gloss, 1.0),
+        },
     )
 
 

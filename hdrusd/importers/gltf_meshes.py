@@ -24,9 +24,9 @@ from hdrusd.report import Kind
 
 _TRIANGLES, _STRIP, _FAN = range(4, 7)
 _OTHER_MODES = {0: "points", 1: "lines", 2: "a line loop", 3: "a line strip"}
-_READ_ATTRIBUTES = {"POSITION", "NORMAL", "COLOR_0"} | {
-    f"{what}_{number}" for what in ("JOINTS", "WEIGHTS") for number in range(SETS)
-}
+_TEXCOORDS = {f"TEXCOORD_{number}" for number in range(16)}
+_READ_ATTRIBUTES = {"POSITION", "NORMAL", "COLOR_0"} | _TEXCOORDS
+_READ_ATTRIBUTES |= {f"{what}_{number}" for what in ("JOINTS", "WEIGHTS") for number in range(SETS)}
 
 Corners = npt.NDArray[Any]  # (f, 3) whole numbers, dtype as the file has it
 
@@ -81,6 +81,7 @@ class MeshReader:
         self.errors: list[InputError] = []
         self._points = 0
         self._faces = 0
+        self._uv_sets: dict[int, set[str]] = {}  # that a material reads
         self._lost: Counter[str] = Counter()
         for number, item in enumerate(document.table("meshes")):
             self.by_mesh.append(self._mesh(item, number, item.name or f"mesh_{number}"))
@@ -93,7 +94,7 @@ class MeshReader:
         lost: set[str] = set()
         for number, primitive in enumerate(item.children("primitives")):
             attributes = primitive.child("attributes")
-            lost |= {key for key in attributes.data if not _is_read(key)}
+            lost |= attributes.data.keys() - _READ_ATTRIBUTES
             if primitive.data.get("targets"):
                 lost.add("morph targets")
             mode = primitive.integer("mode") if "mode" in primitive else _TRIANGLES
@@ -137,7 +138,7 @@ class MeshReader:
             two_sided = False
         else:
             two_sided = self._materials[material].two_sided
-            _check_uv_sets(item, self._materials[material], vertices.uvs)
+            self._check_uv_sets(item, material, vertices.uvs)
         vertex: Interpolation = "vertex"
         return Mesh(
             name=name,
@@ -169,14 +170,12 @@ class MeshReader:
         self._points += len(points)
         self._check_budget(item)
         uvs = {}
-        for key in sorted(attributes.data):
-            if key.startswith("TEXCOORD_") and _is_read(key):
-                uv = self._attribute(attributes, key, len(points), 2)
-                if uv is not None:
-                    flipped = np.empty_like(uv)
-                    flipped[:, 0] = uv[:, 0]
-                    np.subtract(np.float32(1.0), uv[:, 1], out=flipped[:, 1])
-                    uvs[uv_set_name(int(key.removeprefix("TEXCOORD_")))] = flipped
+        for key in sorted(attributes.data.keys() & _TEXCOORDS):
+            uv = self._attribute(attributes, key, len(points), 2)
+            if uv is not None:
+                flipped = uv.copy()
+                np.subtract(np.float32(1.0), uv[:, 1], out=flipped[:, 1])
+                uvs[uv_set_name(int(key.removeprefix("TEXCOORD_")))] = flipped
         return _Vertices(
             points,
             self._attribute(attributes, "NORMAL", len(points), 3),
@@ -199,8 +198,10 @@ class MeshReader:
         except InputError as error:
             self._document.keep_going(error, "attribute-dropped", key, "dropped")
             return None
+        if key == "NORMAL":
+            return values
         finite = np.isfinite(values)
-        if finite.all() or key == "NORMAL":
+        if finite.all():
             return values
         text = f"{key}: {int((~finite).any(axis=1).sum())} elements are not finite; 0 is used"
         attributes.note(Kind.INVALID, "attribute-not-finite", text)
@@ -232,11 +233,15 @@ class MeshReader:
             item.note(Kind.INVALID, "mesh-indices", text)
         return order[: len(order) - rest].reshape(-1, 3)
 
-
-def _is_read(key: str) -> bool:
-    return key in _READ_ATTRIBUTES or (
-        key.startswith("TEXCOORD_") and key.removeprefix("TEXCOORD_") in map(str, range(16))
-    )
+    def _check_uv_sets(self, item: Item, number: int, uvs: dict[str, Floats]) -> None:
+        material = self._materials[number]
+        used = self._uv_sets.get(number)
+        if used is None:
+            used = self._uv_sets[number] = {map.uv_set for map in material.maps().values()}
+        for name in sorted(used - uvs.keys()):
+            called = one_line(material.name)
+            text = f"{called} reads texture coordinates {name}, which the mesh has not"
+            item.note(Kind.MISSING, "mesh-uv-set", text)
 
 
 def _strip(order: npt.NDArray[Any]) -> Corners:
@@ -277,17 +282,20 @@ def _good_faces(item: Item, corners: Corners, points: Floats) -> Corners:
 def _used_only(vertices: _Vertices, corners: Corners) -> tuple[_Vertices, Ints]:
     """The vertices that the faces use, and the faces' numbers among those."""
     used = np.zeros(len(vertices.points), bool)
-    used[corners] = True
     flat = corners.reshape(-1)
+    used[flat.astype(np.intp)] = True
     if used.all():
-        return vertices, np.ascontiguousarray(flat, np.int32)
+        if flat.dtype == np.uint32:  # the numbers are below that of the vertices: no copy
+            return vertices, np.ascontiguousarray(flat).view(np.int32)
+        return vertices, flat.astype(np.int32)
     numbers = np.cumsum(used, dtype=np.int32) - np.int32(1)
     return vertices.take(used), numbers[flat]
 
 
 def _mended_normals(item: Item, normals: Floats, points: Floats, indices: Ints) -> Floats:
     """Normals that are zero or not finite get the direction of the faces around them."""
-    bad = (normals[:, 0] == 0.0) & (normals[:, 1] == 0.0) & (normals[:, 2] == 0.0)
+    none = normals == 0.0
+    bad = none[:, 0] & none[:, 1] & none[:, 2]
     finite = np.isfinite(normals)
     if not finite.all():
         bad |= ~finite.all(axis=1)
@@ -309,10 +317,3 @@ def _mended_normals(item: Item, normals: Floats, points: Floats, indices: Ints) 
     text = f"{int(bad.sum())} normals are zero or not finite; taken from the faces around them"
     item.note(Kind.REPLACED, "mesh-normals", text)
     return mended
-
-
-def _check_uv_sets(item: Item, material: Material, uvs: dict[str, Floats]) -> None:
-    used = (material.diffuse_map, material.emission_map)
-    for name in {texture.uv_set for texture in used if texture is not None} - set(uvs):
-        text = f"{one_line(material.name)} reads texture coordinates {name}, which the mesh has not"
-        item.note(Kind.MISSING, "mesh-uv-set", text)

@@ -79,6 +79,8 @@ class SkinReader:
         numbers: dict[int, int | None] = {}
         for number, node in made.items():
             item = self._document.table("nodes")[number]
+            if "skin" not in item:
+                continue
             skin, mesh = item.index("skin", "skins"), item.index("mesh", "meshes")
             if skin is None or mesh is None or not meshes[mesh]:
                 continue

@@ -152,9 +152,9 @@ IMPORTERS.add("3ds", "hdrusd.importers.tds:read")
 IMPORTERS.add("gltf", "hdrusd.importers.gltf:read")
 IMPORTERS.add("obj", "hdrusd.importers.obj:read")
 IMPORTERS.add("osg", "hdrusd.importers.osg:read")
-IMPORTERS.add("osgb", "hdrusd.importers.osgb:read")
+IMPORTERS.add("osgb", "hdrusd.importers.osg:read")
 IMPORTERS.add("assimp", "hdrusd.importers.assimp:read")
-IMPORTERS.add("osgconv", "hdrusd.importers.osgconv:read")
+IMPORTERS.add("osgconv", "hdrusd.importers.osg:read")
 
 #: File suffix (lower case) to the name of its format.
 SUFFIXES = {
@@ -184,12 +184,17 @@ SUFFIXES = {
 
 def read(resolver: Resolver, report: Report) -> LegacyScene:
     """Read a legacy file by its suffix. Raises InputError."""
+    scene = read_part(resolver, report)
+    note_unplaced(scene, report)
+    return scene
+
+
+def read_part(resolver: Resolver, report: Report) -> LegacyScene:
+    """Read a legacy file that another one may be made of, by its suffix. Raises InputError."""
     suffix = resolver.source.suffix.lower()
     name = SUFFIXES.get(suffix, suffix.removeprefix("."))
-    if name not in IMPORTERS.names():
+    if name not in IMPORTERS:
         raise InputError(
             resolver.source, f"{suffix or 'no suffix'}: no reader; want {', '.join(SUFFIXES)}"
         )
-    scene = IMPORTERS[name](resolver, report)
-    note_unplaced(scene, report)
-    return scene
+    return IMPORTERS[name](resolver, report)

@@ -1,7 +1,7 @@
 """Wavefront MTL material libraries as OpenGL records.
 
 Source: Alias|Wavefront, MTL material format, version 4.2 (1995); Ke, map_Ke and
-the PBR statements (Pr, Pm, ...) are extensions that exporters agree on. Every
+the PBR statements (Pr, Pm, norm, ...) are extensions that exporters agree on. Every
 number is kept as it stands: Ka is never added to Ke, Ns stays the exponent.
 """
 
@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.importers.importer import Resolver
 from hdrusd.importers.mtl_textures import MapStatement, locate, opacity_channel, texture
 from hdrusd.importers.obj_text import Tally, blocks, decode, lines_of, shorten, to_float
-from hdrusd.legacy.scene import RGB, Image, Material, Texture
+from hdrusd.legacy.scene import GREEN_UP, RGB, Image, Material, Texture, normal_texels
 from hdrusd.report import Kind, Report
 
 #: The fields that every MTL material has, said or not.
@@ -23,12 +24,18 @@ FIELDS = frozenset({"ambient", "diffuse", "specular", "emission", "shininess", "
 
 #: Statement in lower case to its name in Material.pbr.
 _PBR = {"pr": "roughness", "pm": "metallic"}
-_READ = {"ka", "kd", "ks", "ke", "ns", "d", "tr", "illum", "map_kd", "map_ke", "map_d", *_PBR}
-#: Known statements that have no home in the record.
+#: A coat, which a surface of Phong's has not.
+_COAT = {"pc": "clearcoat", "pcr": "clearcoat_roughness"}
+_NORMALS = ("norm", "map_norm")
+#: Maps of one number, of which -imfchan names the channel.
+_ONE = {"map_d", *(f"map_{key}" for key in (*_PBR, *_COAT))}
+_READ = {"ka", "kd", "ks", "ke", "ns", "d", "tr", "illum", "map_kd", "map_ke", "map_d", *_NORMALS}
+#: Known statements that have no home in the record. Writers disagree on the channels of
+#: map_RMA and map_ORM, whose names both stand for either.
 _HOMELESS = {
-    *("ni", "tf", "kt", "sharpness", "bump", "disp", "decal", "refl", "norm"),
-    *("ps", "pc", "pcr", "aniso", "anisor", "map_pr", "map_pm", "map_ps", "map_pc", "map_pcr"),
-    *("map_ka", "map_ks", "map_ns", "map_bump", "map_disp", "map_refl", "map_norm", "map_tr"),
+    *("ni", "tf", "kt", "sharpness", "bump", "disp", "decal", "refl"),
+    *("ps", "pc", "pcr", "aniso", "anisor", "map_ps", "map_pc", "map_pcr", "map_rma", "map_orm"),
+    *("map_ka", "map_ks", "map_ns", "map_bump", "map_disp", "map_refl", "map_tr"),
     "map_aat",
 }
 #: d and Tr are each printed with three decimals or more, so they agree within that.
@@ -115,6 +122,7 @@ class _Builder:
     report: Report
     images: dict[str, Image]
     defaults: set[str] = field(default_factory=set)
+    read: set[str] = field(default_factory=lambda: set(_READ))  # statements with a home
 
     def material(self) -> Material:
         said = self.entry.statements
@@ -131,8 +139,7 @@ class _Builder:
             if used is not None and key in said and not any(factor):
                 text = f"{said[key].keyword} is zero and multiplies its texture: nothing shows"
                 self._note(Kind.ASSUMED, "mtl-zero-factor", text)
-        pbr = {name: self._scalar(said[key], math.nan) for key, name in _PBR.items() if key in said}
-        pbr = {name: value for name, value in pbr.items() if not math.isnan(value)}
+        pbr, maps = self._physical()
         ambient = self._color("ka", "ambient", record.ambient)
         shininess = self._shininess(record.shininess)
         return Material(
@@ -152,7 +159,41 @@ class _Builder:
             pbr=pbr or None,
             defaults=frozenset(self.defaults),
             extras=self._extras(),
+            **maps,
         )
+
+    def _physical(self) -> tuple[dict[str, float], dict[str, Any]]:
+        """The numbers of a physical surface, and its maps by the fields of ``Material``."""
+        said = self.entry.statements
+        physical = any(key in said or f"map_{key}" in said for key in _PBR)
+        names = _PBR | _COAT if physical else {}
+        self.read |= {*names, *(f"map_{key}" for key in names)}
+        stated = {key: self._scalar(said[key], math.nan) for key in names if key in said}
+        pbr = {
+            names[key]: self._share(said[key], value)
+            for key, value in stated.items()
+            if not math.isnan(value)
+        }
+        maps: dict[str, Any] = {}
+        for key, name in names.items():
+            found = self._map(f"map_{key}")
+            if found is None:
+                continue
+            if pbr.get(name, 1.0) != 1.0 and not found.image.missing:
+                text = f"{said[key].keyword} {pbr[name]:g}: the map stands in its place, as Blender"
+                self._note(Kind.ASSUMED, "mtl-map-factor", f"{text} writes it", said[key])
+            pbr.setdefault(name, 1.0 if name == "roughness" else 0.0)  # if there is no picture
+            maps[f"{name}_map"] = found if found.channel != "rgb" else replace(found, channel="r")
+        if "clearcoat_roughness" in pbr:
+            pbr.setdefault("clearcoat", 0.0)
+        key = next((key for key in _NORMALS if key in said), "")
+        normal = self._map(key)
+        if normal is not None:
+            scale, bias = normal_texels()
+            maps["normal_map"] = replace(normal, scale=scale, bias=bias)
+            if not normal.image.missing:
+                self._note(Kind.ASSUMED, "normal-green", GREEN_UP, said[key])
+        return pbr, maps
 
     def _note(self, kind: Kind, code: str, text: str, statement: _Statement | None = None) -> None:
         line = self.entry.line if statement is None else statement.line
@@ -199,6 +240,13 @@ class _Builder:
             return number
         self._broken(statement, "a finite number", "the default")
         return default
+
+    def _share(self, statement: _Statement, value: float) -> float:
+        """A number from 0 to 1."""
+        share = min(max(value, 0.0), 1.0)
+        if share != value:
+            self._broken(statement, "a number from 0 to 1", f"{share:g}")
+        return share
 
     def _shininess(self, default: float) -> float:
         statement = self.entry.statements.get("ns")
@@ -275,7 +323,9 @@ class _Builder:
             self._note(Kind.INVALID, "mtl-map", text, statement)
             return None
         found, lost = texture(parsed, self._image(parsed.file, statement))
-        if key == "map_d" and opacity_channel(parsed) is not None:
+        channel = opacity_channel(parsed)
+        if key in _ONE and channel is not None:
+            found = replace(found, channel=channel)
             lost = [option for option in lost if not option.startswith("-imfchan")]
         if lost:
             text = f"{statement.keyword} {shorten(', '.join(lost), 200)}: no home for the options"
@@ -306,7 +356,7 @@ class _Builder:
     def _extras(self) -> dict[str, str]:
         """Statements without a home, as written, each said once in a finding."""
         said = self.entry.statements
-        left = {key: statement for key, statement in said.items() if key not in _READ}
+        left = {key: statement for key, statement in said.items() if key not in self.read}
         known = [s.keyword for key, s in left.items() if key in _HOMELESS and not _neutral(s)]
         unknown = [s.keyword for key, s in left.items() if key not in _HOMELESS]
         for kind, code, words, text in (

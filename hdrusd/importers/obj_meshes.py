@@ -76,8 +76,11 @@ def usable_faces(file: Statements, materials: Ints, tally: Tally) -> Faces:
     for index, count in ((texcoord, len(file.texcoords)), (normal, len(file.normals))):
         astray |= (index == BAD) | (index >= count)
     largest = float(np.finfo(np.float32).max)
-    broken = ~np.all(np.abs(file.points) <= largest, axis=1)  # NaN is not <= either
-    broken_corner = broken[np.clip(vertex, 0, points - 1)] & ~astray
+    sound = np.abs(file.points) <= largest  # NaN is not <= either
+    broken_corner = np.zeros(len(vertex), bool)
+    if not sound.all():
+        broken = ~np.all(sound, axis=1)
+        broken_corner = broken[np.clip(vertex, 0, points - 1)] & ~astray
     keep = np.ones(faces.counts.size, bool)
     for code, corner in (("face-index", astray), ("face-point", broken_corner)):
         if corner.any():
@@ -97,7 +100,8 @@ def recentre(file: Statements, faces: Faces) -> Vec3 | None:
         return None
     used = np.zeros(len(file.points), bool)
     used[faces.corners[:, 0]] = True
-    low, high = file.points[used].min(axis=0), file.points[used].max(axis=0)
+    columns = file.points[used].T.copy()  # of long rows NumPy makes faster work
+    low, high = columns.min(axis=1), columns.max(axis=1)
     reach = max(float(np.abs(low).max()), float(np.abs(high).max()))
     if reach < _FAR or float((high - low).max()) > reach:
         return None
@@ -110,7 +114,7 @@ def recentre(file: Statements, faces: Faces) -> Vec3 | None:
 def mesh_of(file: Statements, faces: Faces, name: str, source: Path, tally: Tally) -> Mesh:
     """The faces of one group as a mesh."""
     used, indices = _compact(faces.corners[:, 0])
-    points = file.points[used]
+    points = file.points.take(used, axis=0)
     line = file.groups[int(faces.group[0])].line or int(faces.lines[0])
     uv = _texcoords(file, faces, tally)
     material, subsets = _materials(faces.material)
@@ -143,10 +147,11 @@ def _compact(vertex: Ints) -> tuple[Integers, Ints]:
 
 def _texcoords(file: Statements, faces: Faces, tally: Tally) -> Floats | None:
     index = faces.corners[:, 1]
-    if np.all(index == ABSENT):
+    bad = index == ABSENT
+    if bad.all():
         return None
-    values = file.texcoords[np.maximum(index, 0)]
-    bad = (index == ABSENT) | ~np.isfinite(values).all(axis=1)
+    values = file.texcoords.take(np.maximum(index, 0), axis=0)
+    bad |= _not_finite(values)
     faces.note(tally, "texcoord-missing", bad)
     if bad.all():
         return None
@@ -158,10 +163,12 @@ def _normals(
     file: Statements, faces: Faces, points: Doubles, indices: Ints, tally: Tally
 ) -> Floats | None:
     index = faces.corners[:, 2]
-    if np.all(index == ABSENT):
+    bad = index == ABSENT
+    if bad.all():
         return None
-    values = file.normals[np.maximum(index, 0)]
-    bad = (index == ABSENT) | ~np.isfinite(values).all(axis=1) | ~np.any(values, axis=1)
+    values = file.normals.take(np.maximum(index, 0), axis=0)
+    none = values == 0.0
+    bad |= _not_finite(values) | (none[:, 0] & none[:, 1] & none[:, 2])
     faces.note(tally, "normal-missing", bad)
     if bad.all():
         return None
@@ -169,6 +176,12 @@ def _normals(
         flat = np.repeat(_face_normals(points[indices], faces), faces.counts, axis=0)
         values[bad] = flat[bad]
     return values
+
+
+def _not_finite(values: Floats) -> Bools | np.bool_:
+    """Of rows, (n,); one False where all are finite."""
+    finite = np.isfinite(values)
+    return np.False_ if finite.all() else ~finite.all(axis=1)
 
 
 def _face_normals(corner: Doubles, faces: Faces) -> Doubles:

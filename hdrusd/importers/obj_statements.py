@@ -43,6 +43,8 @@ _CODES = {
     "obj-attributes": "s mg bevel c_interp d_interp lod shadow_obj trace_obj ctech stech maplib "
     "usemap call csh",
 }
+#: Different lines that are remembered as such.
+_COUNTED = 1000
 _CODE_OF = {word.encode(): code for code, words in _CODES.items() for word in words.split()}
 
 
@@ -121,6 +123,8 @@ class _Collector:
     #: From that line on: the group and the material.
     changes: list[tuple[int, int, int]] = field(default_factory=lambda: [(0, 0, -1)])
     libraries: dict[str, int] = field(default_factory=dict)
+    #: Lines that are but counted ("s 1" stands there by the thousand): code and thing.
+    counted: dict[bytes, tuple[str, str]] = field(default_factory=dict)
 
     def add(self, block: Block) -> None:
         kind = _kinds(block)
@@ -139,8 +143,16 @@ class _Collector:
         if self.totals[_V] > self.resolver.limits.vertices:
             text = f"more than {self.resolver.limits.vertices} vertices; raise the limit"
             raise InputError(self.resolver.source, text)
-        for index in np.flatnonzero(kind == _OTHER).tolist():
-            self._statement(block.line(index), int(block.numbers[index]))
+        other = np.flatnonzero(kind == _OTHER)
+        ends = (block.starts[other] + block.lengths[other] - 1).tolist()
+        starts, numbers = block.starts[other].tolist(), block.numbers[other].tolist()
+        for start, end, number in zip(starts, ends, numbers, strict=True):
+            line = block.text[start:end]
+            if line in self.counted:
+                finding, thing = self.counted[line]
+                self.tally.note(finding, number, thing=thing)
+            else:
+                self._statement(line, number)
 
     def _numbers(self, block: Block, chosen: Bools, keyword: int) -> tuple[Doubles, Integers]:
         values, counts, commas = floats(block.arguments(chosen, keyword))
@@ -226,6 +238,8 @@ class _Collector:
             known = _CODE_OF.get(keyword)
             thing = keyword.decode() if known else ""
             self.tally.note(known or "obj-unknown", number, thing=thing)
+            if known and line.isascii() and len(self.counted) < _COUNTED:
+                self.counted[line] = known, thing
 
     def _enter(self, name: str, group: str, line: int) -> None:
         """Every ``o`` is an object of its own; ``g`` with a name it had before goes on with it."""

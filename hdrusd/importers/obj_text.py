@@ -12,16 +12,16 @@ from __future__ import annotations
 import codecs
 import math
 import re
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from hdrusd.errors import InputError, SourceRef
+from hdrusd.importers.number_text import decimals, wholes
 from hdrusd.report import Kind, Report
 
 Bytes = npt.NDArray[np.uint8]
@@ -31,6 +31,7 @@ Doubles = npt.NDArray[np.float64]
 
 _BLOCK = 1 << 22  # bytes: the work arrays of one block stay near the processor's cache
 _LONGEST_LINE = 1 << 26  # bytes: what one statement may cost in memory is a multiple of it
+_LINES_A_RUN = 8  # of one kind, on average: fewer are not worth a copy of each run
 _BLANK = 32  # this and every control byte below it separate words
 _NEWLINE, _SLASH, _JOINT = 10, 47, 11
 _LINE_END = re.compile(rb"(?<!\\)\n")
@@ -114,7 +115,12 @@ class Block:
     def arguments(self, chosen: Bools, keyword: int) -> Rows:
         """The bytes of the chosen lines with the first ``keyword`` bytes of each blanked."""
         buffer = np.frombuffer(self.text, np.uint8)
-        text = buffer.copy() if chosen.all() else buffer[np.repeat(chosen, self.lengths)]
+        turns = np.flatnonzero(np.diff(chosen, prepend=False, append=False))
+        if turns.size * _LINES_A_RUN < chosen.size:  # mostly they stand together
+            bounds = np.append(self.starts, buffer.size)[turns].reshape(-1, 2).tolist()
+            text = np.concatenate([buffer[begin:end] for begin, end in bounds])
+        else:
+            text = buffer[np.repeat(chosen, self.lengths)]
         lengths = self.lengths[chosen]
         starts = np.cumsum(lengths) - lengths
         for offset in range(keyword):
@@ -179,8 +185,8 @@ def floats(rows: Rows) -> tuple[Doubles, Integers, int]:
     rows = _without_comments(rows)
     blank = rows.text <= _BLANK
     counts = _per_line(np.flatnonzero(_first(blank)), rows)
-    values = _convert(rows.text, np.float64, int(counts.sum()))
-    if values is not None:
+    values = decimals(rows.text.tobytes())
+    if values is not None and values.size == counts.sum():
         return values, counts, 0
     words = [line.split() for line in rows.text.tobytes().split(b"\n")[:-1]]
     mended = [to_float(word.decode("latin-1")) for line in words for word in line]
@@ -226,17 +232,42 @@ def corners(rows: Rows) -> tuple[Integers, Integers]:
     corner_at = np.flatnonzero(_first(blank))
     number_at = np.flatnonzero(_first(blank | slash))
     counts = _per_line(corner_at, rows)
-    values = _convert(np.where(slash, np.uint8(_BLANK), text), np.int64, number_at.size)
-    if values is None:
+    values = wholes(text.tobytes().replace(b"/", b" "))
+    if values is None or values.size != number_at.size:
         return _corners_by_word(text.tobytes())
     slash_at = np.flatnonzero(slash)
+    slots = _alike(corner_at, number_at, slash_at)
+    if slots == (0, 1, 2):
+        return values.reshape(-1, 3), counts
     table = np.zeros((corner_at.size, 3), np.int64)
+    if slots:
+        table[:, slots] = values.reshape(-1, len(slots))
+        return table, counts
     owner = np.searchsorted(corner_at, number_at, side="right") - 1
     slot = np.searchsorted(slash_at, number_at) - np.searchsorted(slash_at, corner_at)[owner]
     good = slot < 3
     table[owner[good], slot[good]] = values[good]
     table[owner[~good]] = 0
     return table, counts
+
+
+def _alike(corner_at: Integers, number_at: Integers, slash_at: Integers) -> tuple[int, ...]:
+    """Which indices all corners have, if all are written the same way; else nothing."""
+    corners = corner_at.size
+    if not corners:
+        return ()
+    for slots, slashes in (((0, 1, 2), 2), ((0, 2), 2), ((0, 1), 1), ((0,), 0)):
+        if number_at.size != len(slots) * corners or slash_at.size != slashes * corners:
+            continue
+        number, slash = number_at.reshape(corners, -1), slash_at.reshape(corners, -1)
+        good = np.array_equal(number[:, 0], corner_at)
+        for column, slot in enumerate(slots[1:], 1):
+            good = good and np.array_equal(slash[:, slot - 1] + 1, number[:, column])
+        if slots == (0, 2):
+            good = good and np.array_equal(slash[:, 0] + 1, slash[:, 1])
+        if good:
+            return slots
+    return ()
 
 
 def _corners_by_word(text: bytes) -> tuple[Integers, Integers]:
@@ -274,20 +305,11 @@ def _first(blank: Bools) -> Bools:
 
 
 def _per_line(word_at: Integers, rows: Rows) -> Integers:
+    lines = rows.starts.size
+    width, rest = divmod(word_at.size, max(lines, 1))
+    if width and not rest:
+        words = word_at.reshape(lines, width)
+        if (words[:, 0] >= rows.starts).all() and (words[:-1, -1] < rows.starts[1:]).all():
+            return np.full(lines, width, np.int64)
     bounds = np.append(rows.starts, rows.text.size)
     return np.diff(np.searchsorted(word_at, bounds)).astype(np.int64)
-
-
-def _convert(
-    text: Bytes, kind: type[np.float64] | type[np.int64], words: int
-) -> npt.NDArray[Any] | None:
-    """All words as numbers, or None if any of them is not one."""
-    if words == 0:
-        return np.zeros(0, kind)
-    try:
-        with warnings.catch_warnings():  # NumPy before 2.4 warns where later ones raise
-            warnings.simplefilter("error", DeprecationWarning)
-            values = np.fromstring(text.tobytes(), kind, sep=" ")
-    except (ValueError, DeprecationWarning):
-        return None
-    return values if values.size == words else None

@@ -1,9 +1,10 @@
-"""Reader for OpenSceneGraph text: ``.osgt`` and the older ``.osg``.
+"""Reader for OpenSceneGraph: ``.osgt``, the older ``.osg``, ``.osgb`` and ``.ive``.
 
 The tree is walked with an explicit stack, since its depth is the file's choice:
 an object may be used in many places, and a reference may lead back to an
 ancestor. A shared node is one node, and a shared Geometry one mesh, wherever
-they look the same: below different states they do not.
+they look the same: below different states they do not. What nodes stand for in
+other files is walked in its place.
 
 Sources: OpenSceneGraph 3.6, src/osgWrappers/serializers (.osgt),
 src/osgWrappers/deprecated-dotosg (.osg).
@@ -15,64 +16,52 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from hdrusd.errors import InputError, SourceRef
+from hdrusd.importers.cycle_search import put_off
 from hdrusd.importers.expansion import check_expansion
 from hdrusd.importers.importer import Resolver
-from hdrusd.importers.osg_geometry import GeometryReader
-from hdrusd.importers.osg_light_points import LightPointReader
-from hdrusd.importers.osg_lights import LightReader
+from hdrusd.importers.osg_files import File, Files, load
+from hdrusd.importers.osg_lights import LightSwitches
 from hdrusd.importers.osg_materials import Look, MaterialReader
-from hdrusd.importers.osg_nodes import DRAWABLES, NODES, Description, NodeReader
+from hdrusd.importers.osg_nodes import DRAWABLES, NODES, Description, External
 from hdrusd.importers.osg_shapes import read_shape
-from hdrusd.importers.osg_state import RenderState, StateReader
-from hdrusd.importers.osg_text import Document, Statement, listed, parse, triple
-from hdrusd.importers.osg_textures import TextureReader
+from hdrusd.importers.osg_state import RenderState
+from hdrusd.importers.osg_text import Statement, listed, triple
 from hdrusd.legacy.scene import TRS, LegacyScene, Mesh, Node
 from hdrusd.report import Kind, Report
 
 
 def read(resolver: Resolver, report: Report) -> LegacyScene:
     """Read ``resolver.source``. Raises InputError when nothing can be used."""
-    return read_text(resolver.read(), resolver, report)
-
-
-def read_text(data: bytes, resolver: Resolver, report: Report) -> LegacyScene:
-    """Read text that stands for ``resolver.source``. Raises InputError."""
-    return read_document(parse(data, resolver.source, report, resolver.limits), resolver)
-
-
-def read_document(document: Document, resolver: Resolver) -> LegacyScene:
-    """The scene of a tree, whatever form it was in. Raises InputError."""
-    return _SceneReader(document, resolver).read()
+    with put_off():
+        return _SceneReader(resolver, report).read()
 
 
 @dataclass(slots=True)
 class _Visit:
     """A node still to be read, and the list of children that it goes into."""
 
-    place: Statement | None  # None: a reference to nothing; an empty node keeps its place
+    file: File
+    place: Statement | Node | None  # a Node: read already; None: a reference to nothing
     into: list[Node]
     state: RenderState
-    ancestors: tuple[Any, ...]  # (id of the parent's statement, its ancestors), () at the root
+    ancestors: tuple[Any, ...]  # (the parent's statement or file, its ancestors), () at the root
     depth: int
 
 
 class _SceneReader:
-    """Walks the tree of one document."""
+    """Walks the tree of a file, and of the files that it names."""
 
-    def __init__(self, document: Document, resolver: Resolver) -> None:
-        self.document = document
+    def __init__(self, resolver: Resolver, report: Report) -> None:
         self.limits = resolver.limits
+        document = load(resolver, report)
         self.scene = LegacyScene(
             resolver.source, "osg", up="Z", unit_m=1.0, generator=document.generator
         )
-        self.described = NodeReader(document, resolver.limits.vertices)
-        self.states = StateReader(document)
-        self.geometries = GeometryReader(document, resolver.limits.vertices)
-        self.materials = MaterialReader(
-            document, TextureReader(document, resolver), self.scene.materials
-        )
-        self.lights = LightReader(document, self.scene.lights)
-        self.points = LightPointReader(document, self.scene.lights)
+        self.report = report
+        self.materials = MaterialReader(self.scene.materials)
+        self.switches = LightSwitches(self.scene.lights)
+        self.files = Files(self.scene, report, self.materials, self.switches, self.limits)
+        self.file = self.files.add(document, resolver)
         self.stack: list[_Visit] = []
         self.count = 0  # nodes and drawables
         self.known = False  # whether any was of a known class
@@ -81,28 +70,34 @@ class _SceneReader:
         self._meshes: dict[tuple[int, Look], int] = {}
         self._cameras: dict[int, int] = {}
         self._light_models: set[int] = set()
+        self._drawn: set[int] = set()  # meshes without their looks, whose points count
 
     def read(self) -> LegacyScene:
         """The whole scene. Raises InputError past the limits or where no node is known."""
-        document = self.document
-        source = SourceRef(document.file)
+        source = SourceRef(self.scene.source)
         text = "the format states no unit and no up axis; 1 unit is 1 m, Z is up"
-        document.report.add(Kind.ASSUMED, "osg-axes", source, "", text)
+        self.report.add(Kind.ASSUMED, "osg-axes", source, "", text)
         root = RenderState()
-        roots = list(document.objects(document.root))
-        self.stack = [_Visit(place, self.scene.roots, root, (), 1) for place in reversed(roots)]
+        above = self.file, ()
+        self.stack = [
+            _Visit(self.file, place, self.scene.roots, root, above, 1)
+            for place in reversed(self.file.roots)
+        ]
         while self.stack:
             self._visit(self.stack.pop())
         check_expansion(self.scene.roots, self.limits)
-        self.lights.finish()
+        self.switches.finish()
         if not self.known:
             raise InputError(source, "no node of a known class; want an OpenSceneGraph scene")
         return self.scene
 
     def _visit(self, visit: _Visit) -> None:
-        place = visit.place
+        file, place = visit.file, visit.place
+        if isinstance(place, Node):
+            visit.into.append(place)
+            return
         if place is None or self._is_cycle(visit, place):
-            missing = Node("missing", SourceRef(self.document.file), visible=False)
+            missing = Node("missing", SourceRef(file.document.file), visible=False)
             visit.into.append(missing)
             return
         # The same node in the same state looks the same wherever it stands.
@@ -113,11 +108,11 @@ class _SceneReader:
         self._counted(place)
         if visit.depth > self.limits.depth:
             text = f"nodes deeper than {self.limits.depth}"
-            raise InputError(self.document.ref(place), text)
-        found = self.described.read(place)
+            raise InputError(file.document.ref(place), text)
+        found = file.described.read(place)
         node = Node(
             found.name,
-            self.document.ref(place),
+            file.document.ref(place),
             found.placement.transform,
             animation=found.placement.animation,
             visible=found.visible,
@@ -125,31 +120,79 @@ class _SceneReader:
         self._made[key] = node
         visit.into.append(node)
         if place.class_name in DRAWABLES:
-            self._draw(node, place, visit.state)
+            self._draw(file, node, place, visit.state)
             return
-        state = self.states.below(visit.state, place)
-        self._light_model(state)
         inner = _unpivoted(node, found)
         inner.kind, inner.extras = found.kind, found.extras
         inner.lod_ranges, inner.lod_on_screen = found.lod_ranges, found.lod_on_screen
         inner.switch_on, inner.switch_masks = found.switch_on, found.switch_masks
         if place.class_name == "LightSource":
-            light = self.lights.read(place, self.document.name(place), state)
+            name = file.document.name(place)
+            light, state = file.lights.read(place, name, visit.state)
             inner.lights += [] if light is None else [light]
-        elif place.class_name == "LightPointNode":
-            inner.lights += self.points.read(place, found.name)
+        else:
+            state = file.states.below(visit.state, place)
+        self._light_model(state)
+        if place.class_name == "LightPointNode":
+            inner.lights += file.points.read(place, found.name)
         self._camera(inner, found)
-        self._drawables(inner, found, state)
-        ancestors = (id(place), visit.ancestors)
-        self.stack.extend(
-            _Visit(child, inner.children, state, ancestors, visit.depth + 1)
-            for child in reversed(found.children)
-        )
+        self._drawables(file, inner, found, state)
+        self._children(visit, inner, found, state)
 
-    def _counted(self, place: Statement) -> None:
+    def _children(self, visit: _Visit, node: Node, found: Description, state: RenderState) -> None:
+        """Put the children of a node on the stack, those in other files too."""
+        file, depth = visit.file, visit.depth + 1
+        ancestors = id(found.place), visit.ancestors
+        below: list[_Visit] = []
+        lost = []
+        for number, child in enumerate(found.children):
+            if not isinstance(child, External):
+                below.append(_Visit(file, child, node.children, state, ancestors, depth))
+                continue
+            self._count()
+            part = self._part(visit, child, found.name)
+            if part is None:
+                lost.append((number, child.name))
+            elif isinstance(part, Node):
+                below.append(_Visit(file, part, node.children, state, ancestors, depth))
+            else:
+                into = node.children
+                if len(part.roots) != 1:  # a level is one child
+                    holder = Node(part.path.stem, SourceRef(part.document.file))
+                    below.append(_Visit(file, holder, into, state, ancestors, depth))
+                    into = holder.children
+                above = part, ancestors
+                below += [_Visit(part, root, into, state, above, depth) for root in part.roots]
+        self.stack += reversed(below)
+        if lost:
+            node.extras = {**node.extras, "files": tuple(name for _, name in lost)}
+            numbers = {number for number, _ in lost}
+            node.lod_ranges = tuple(
+                span for number, span in enumerate(node.lod_ranges) if number not in numbers
+            )
+
+    def _part(self, visit: _Visit, external: External, name: str) -> File | Node | None:
+        """What a node stands for; None, with a finding, where it is not to be had."""
+        file = visit.file
+        path = self.files.find(external, file, name)
+        if path is None:
+            return None
+        ancestors = visit.ancestors
+        while ancestors:
+            if isinstance(ancestors[0], File) and ancestors[0].path == path:
+                text = f"{external.name} leads back to this file; cut here"
+                file.document.add(Kind.INVALID, "osg-cycle", external.place, name, text)
+                return None
+            ancestors = ancestors[1]
+        return self.files.read(path, external, file, name)
+
+    def _count(self) -> None:
         self.count += 1
         if self.count > self.limits.nodes:
-            raise InputError(SourceRef(self.document.file), f"more than {self.limits.nodes} nodes")
+            raise InputError(SourceRef(self.scene.source), f"more than {self.limits.nodes} nodes")
+
+    def _counted(self, place: Statement) -> None:
+        self._count()
         self.known = self.known or place.class_name in NODES | DRAWABLES
 
     def _is_cycle(self, visit: _Visit, place: Statement) -> bool:
@@ -157,8 +200,8 @@ class _SceneReader:
         while ancestors:
             if ancestors[0] == id(place):
                 text = "refers to a node above itself; cut here"
-                name = self.document.name(place)
-                self.document.add(Kind.INVALID, "osg-cycle", place, name, text)
+                document = visit.file.document
+                document.add(Kind.INVALID, "osg-cycle", place, document.name(place), text)
                 return True
             ancestors = ancestors[1]
         return False
@@ -175,30 +218,36 @@ class _SceneReader:
             self.scene.cameras.append(found.camera)
         node.cameras.append(self._cameras[id(found)])
 
-    def _drawables(self, node: Node, found: Description, state: RenderState) -> None:
+    def _drawables(self, file: File, node: Node, found: Description, state: RenderState) -> None:
         """Meshes go to the Geode's own node unless they are hidden or stand elsewhere."""
         for drawable, where in found.drawables:
             self._counted(drawable)
-            own, holder = self.described.read(drawable), node
+            own, holder = file.described.read(drawable), node
             if not own.visible or any(where):
-                source = self.document.ref(drawable)
+                source = file.document.ref(drawable)
                 holder = Node(own.name, source, TRS(where), visible=own.visible)
                 node.children.append(holder)
-            self._draw(holder, drawable, state)
+            self._draw(file, holder, drawable, state)
 
-    def _draw(self, node: Node, drawable: Statement, inherited: RenderState) -> None:
+    def _draw(self, file: File, node: Node, drawable: Statement, inherited: RenderState) -> None:
         """Add the mesh of a drawable to a node, in the look that the state gives it."""
         if drawable.class_name == "Geometry":
-            base = self.geometries.read(drawable)
+            base = file.geometries.read(drawable)
         else:
             if id(drawable) not in self._shapes:
-                self._shapes[id(drawable)] = read_shape(self.document, drawable)
+                self._shapes[id(drawable)] = read_shape(file.document, drawable)
             base = self._shapes[id(drawable)]
         if base is None:
             return
-        state = self.states.below(inherited, drawable)
+        if id(base) not in self._drawn:
+            self._drawn.add(id(base))
+            self.files.count(len(base.points))
+        state = file.states.below(inherited, drawable)
         self._light_model(state)
-        look = self.materials.look(state, colored=base.colors is not None)
+        self.switches.drawn(state)
+        look = self.materials.look(
+            file.document, state, colored=base.colors is not None, uvs=base.uvs
+        )
         key = id(base), look
         if key not in self._meshes:
             self._meshes[key] = len(self.scene.meshes)
@@ -217,15 +266,15 @@ class _SceneReader:
         texture = self.scene.materials[look.material].diffuse_map
         if texture is not None and texture.uv_set not in mesh.uvs:
             text = f"no texture coordinates for {texture.image.name}; all of it has one texel"
-            report = self.document.report
-            report.add(Kind.MISSING, "osg-no-coordinates", mesh.source, mesh.name, text)
+            self.report.add(Kind.MISSING, "osg-no-coordinates", mesh.source, mesh.name, text)
         return mesh
 
     def _light_model(self, state: RenderState) -> None:
         """The first light model's ambient light is the scene's; others that differ are findings."""
-        document, place = self.document, state.attribute("LightModel")
-        if place is None or id(place) in self._light_models:
+        found = state.attribute("LightModel")
+        if found is None or id(found.place) in self._light_models:
             return
+        document, place = found.document, found.place
         self._light_models.add(id(place))
         separate = document.word(place, "colorcontrol") == "SEPARATE_SPECULAR_COLOR"
         further = {

@@ -15,15 +15,11 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-
-import numpy as np
-import numpy.typing as npt
+from functools import lru_cache
 
 from hdrusd.errors import InputError
-from hdrusd.importers.osg_text import Document, Doubles, Statement
+from hdrusd.importers.osg_text import Document, Doubles, Integers, Singles, Statement
 from hdrusd.report import Kind
-
-Integers = npt.NDArray[np.int64]
 
 _TYPE = re.compile(r"U?(?:Vec(?P<size>[234]))?(?P<kind>[a-z]{0,2})\w*Array")
 
@@ -47,12 +43,12 @@ class VertexArray:
     """
 
     place: Statement
-    values: Doubles
+    values: Singles | Doubles
     binding: str
     full_scale: float | None  # of the integer type, None for floating point
     indices: Integers | None = None
 
-    def normalised(self) -> Doubles:
+    def normalised(self) -> Singles | Doubles:
         """The values as OpenGL sees colours and normals."""
         return self.values if self.full_scale is None else self.values / self.full_scale
 
@@ -141,7 +137,7 @@ class ArrayReader:
         indices: Integers | None = None,
     ) -> VertexArray | None:
         """The numbers of ``statement`` in rows. A declared count is compared, never believed."""
-        kind = _TYPE.fullmatch(type_name)
+        kind = _array_type(type_name)
         if statement.block is None:
             return None
         if kind is None:
@@ -149,8 +145,8 @@ class ArrayReader:
                 Kind.DROPPED, "osg-array-type", statement, type_name, "no such array type; left out"
             )
             return None
-        size = int(kind["size"] or 1)
-        numbers = statement.block.numbers()
+        size, full_scale = kind
+        numbers = statement.block.floats()
         rows = len(numbers) // size
         self._spend(rows, statement)
         declared = statement.declared
@@ -162,29 +158,38 @@ class ArrayReader:
                 type_name,
                 f"{declared} declared, {len(numbers)} numbers found; {rows} are used",
             )
-        short = {"UByte": "ub", "UShort": "us", "UInt": "ui", "Byte": "b", "Short": "s", "Int": "i"}
-        letters = kind["kind"] or next((v for k, v in short.items() if type_name.startswith(k)), "")
-        if type_name.startswith("UVec"):  # UVec4bArray is the old name of Vec4ubArray
-            letters = f"u{letters}"
         return VertexArray(
             statement,
             numbers[: rows * size].reshape(rows, size),
             binding.removeprefix("BIND_"),
-            _FULL_SCALE.get(letters),
+            full_scale,
             indices,
         )
 
     def _integers(self, statement: Statement | None) -> Integers | None:
         if statement is None or statement.block is None:
             return None
-        numbers = statement.block.numbers()
+        numbers = statement.block.indices()
         self._spend(len(numbers), statement)
-        return whole(numbers)
+        return numbers
 
     def _spend(self, rows: int, place: Statement) -> None:
         self.rows += rows
         if self.rows > self.limit:
             raise InputError(self.document.ref(place), f"more than {self.limit} array rows in all")
+
+
+@lru_cache(256)
+def _array_type(name: str) -> tuple[int, float | None] | None:
+    """Components of a value and full scale, by the name of a class; None if it is no array's."""
+    kind = _TYPE.fullmatch(name)
+    if kind is None:
+        return None
+    short = {"UByte": "ub", "UShort": "us", "UInt": "ui", "Byte": "b", "Short": "s", "Int": "i"}
+    letters = kind["kind"] or next((v for k, v in short.items() if name.startswith(k)), "")
+    if name.startswith("UVec"):  # UVec4bArray is the old name of Vec4ubArray
+        letters = f"u{letters}"
+    return int(kind["size"] or 1), _FULL_SCALE.get(letters)
 
 
 def _unit(statement: Statement) -> int | None:
@@ -198,9 +203,3 @@ def _type_word(statement: Statement) -> str:
     """
     words = [word for word in statement.words[1:] if _TYPE.fullmatch(word)]
     return words[-1] if words else "Vec3Array"
-
-
-def whole(numbers: Doubles) -> Integers:
-    """Numbers as indices; -1, which is no index, for what is none."""
-    good = (numbers >= 0.0) & (numbers < 2.0**53)  # False for NaN
-    return np.where(good, numbers, -1.0).astype(np.int64)

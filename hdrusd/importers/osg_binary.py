@@ -4,8 +4,8 @@ A file is objects inside objects: the name of the class, the number of the objec
 that ``osg_layouts`` knows. Where the file states the sizes of its blocks, as it does since
 OpenSceneGraph 3.2, a class or a field that is not known is passed over; where it does not, the
 rest cannot be read. Objects are read by generators on a stack of our own, since how deep they
-stand is the file's choice. Arrays stay views of the file; a count is compared with the bytes that
-are left before anything is made of it.
+stand is the file's choice: each yields the objects inside, whose turn it is then. Arrays stay
+views of the file; a count is compared with the bytes that are left before anything is made of it.
 
 Sources: OpenSceneGraph 3.6, src/osgDB/InputStream.cpp, include/osgDB/DataTypes,
 src/osgPlugins/osg/BinaryStreamOperator.h.
@@ -14,40 +14,17 @@ src/osgPlugins/osg/BinaryStreamOperator.h.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.importers.importer import Limits
 from hdrusd.importers.osg_bytes import Bytes, DamagedError, Layout
 from hdrusd.importers.osg_layouts import DTYPES, Element, Field, plan
 from hdrusd.importers.osg_text import Block, Document, Statement
+from hdrusd.importers.osg_type_numbers import ARRAYS, MODES, SETS
 from hdrusd.report import Kind
 
-#: What reads one object; it yields those of the objects inside, whose turn it is then.
-Reader = Generator["Reader", None, None]
-
-_ARRAY_TYPES = (
-    *("ByteArray", "UByteArray", "ShortArray", "UShortArray", "IntArray", "UIntArray"),
-    *("FloatArray", "DoubleArray", "Vec2bArray", "Vec3bArray", "Vec4bArray", "Vec4ubArray"),
-    *("Vec2sArray", "Vec3sArray", "Vec4sArray", "Vec2fArray", "Vec3fArray", "Vec4fArray"),
-    *("Vec2dArray", "Vec3dArray", "Vec4dArray", "Vec2ubArray", "Vec3ubArray", "Vec2usArray"),
-    *("Vec3usArray", "Vec4usArray", "Vec2iArray", "Vec3iArray", "Vec4iArray", "Vec2uiArray"),
-    *("Vec3uiArray", "Vec4uiArray"),
-)
-_LETTERS = {"b": "c", "ub": "C", "s": "h", "us": "H", "i": "i", "ui": "I", "f": "f", "d": "d"}
-_SCALARS = {"Byte": "c", "UByte": "C", "Short": "h", "UShort": "H", "Int": "i", "UInt": "I"}
-#: Primitive sets before version 112: the class, and what the block holds.
-_SETS = {
-    50: ("DrawArrays", None),
-    51: ("DrawArrayLengths", "i"),
-    52: ("DrawElementsUByte", "C"),
-    53: ("DrawElementsUShort", "H"),
-    54: ("DrawElementsUInt", "I"),
-}
-_MODES = (
-    *("POINTS", "LINES", "LINE_LOOP", "LINE_STRIP", "TRIANGLES", "TRIANGLE_STRIP", "TRIANGLE_FAN"),
-    *("QUADS", "QUAD_STRIP", "POLYGON"),
-)
 #: Key frames of osgAnimation: bytes of a value.
 _KEYS = {"Double": 8, "Float": 4, "Vec2": 8, "Vec3": 12, "Vec4": 16, "Quat": 32, "Matrix": 128}
 _CHANNEL = re.compile(f"({'|'.join(_KEYS)})(Step|Linear|SphericalLinear|CubicBezier)Channel")
@@ -73,6 +50,18 @@ def fill(document: Document, data: bytes, start: int, layout: Layout, limits: Li
     _Objects(document, data, start, layout, limits).run()
 
 
+class _Opened(NamedTuple):
+    """An object of which a part is read, and where it ends."""
+
+    rest: Reader
+    statement: Statement
+    end: int
+
+
+#: What reads an object or a part of it: it yields the objects inside, None where one is done.
+Reader = Iterator[_Opened | None]
+
+
 class _Objects(Bytes):
     """One pass over the bytes."""
 
@@ -87,73 +76,79 @@ class _Objects(Bytes):
 
     def run(self) -> None:
         """Read the one object that the file is. Raises InputError, UnknownPartError."""
-        stack = [self._object(self.document.root)]
-        problem: Exception | None = None
-        while stack:
-            try:
-                inner = stack[-1].throw(problem) if problem else next(stack[-1])
-            except StopIteration:
-                stack.pop()
-                problem = None
-                continue
-            except (UnknownPartError, DamagedError) as error:  # for the object around
-                stack.pop()
-                problem = error
-                continue
-            problem = None
-            stack.append(inner)
+        try:
+            root = self._object(self.document.root)
+            stack = [] if root is None else [root]
+            while stack:
+                self._read_on(stack)
+        except DamagedError as problem:
+            raise self._error(f"{problem}; want a whole, undamaged file") from problem
+
+    def _read_on(self, stack: list[_Opened]) -> None:
+        """Read the object on top up to the next one inside, which is put on it, or to its end."""
+        opened = stack[-1]
+        self.end = opened.end
+        try:
+            inner = next(opened.rest)
+        except StopIteration:
+            stack.pop()
+        except (UnknownPartError, DamagedError) as problem:
+            if not self.layout.sizes:
+                raise
+            self._unread(opened.statement, problem, opened.end)
+            stack.pop()
+        else:
+            if inner is not None:
+                stack.append(inner)
             if len(stack) > self.limits.depth:
                 raise self._error(f"objects deeper than {self.limits.depth}")
-        if isinstance(problem, DamagedError):
-            raise self._error(f"{problem}; want a whole, undamaged file")
-        if problem is not None:
-            raise problem
+            return
+        if self.layout.sizes:
+            self.at = opened.end
+
+    def _unread(self, place: Statement, problem: Exception, end: int) -> None:
+        text = f"{problem}; {end - self.at} bytes are passed over"
+        kind = Kind.INVALID if isinstance(problem, DamagedError) else Kind.DROPPED
+        self.document.add(kind, "osg-unread", place, place.label, text)
 
     def _error(self, problem: str) -> InputError:
         return InputError(SourceRef(self.document.file, f"byte {self.at}"), problem)
 
     # -- objects ---------------------------------------------------------------------------
 
-    def _object(self, block: Block) -> Reader:
-        """Read an object, or a reference to one, into a block."""
+    def _object(self, block: Block) -> _Opened | None:
+        """Put an object into a block, without its fields; None if it has none to be read."""
         start = self.at
         label = self.text()
         statement = Statement([label], start)
         block.statements.append(statement)
         if label == "NULL":
-            return
+            return None
         end = self.open()
         number = str(self.number())
-        inner = Block()
-        statement.block = inner
+        statement.block = inner = Block()
         definitions = self.document.definitions
         if number in definitions:
             inner.statements.append(Statement(["UniqueID", number], start))
             self.at = end if self.layout.sizes else self.at
-            return
+            return None
         fields = self._plan(label)
         if self.layout.sizes and self.at == end and fields != ():  # in a part that was passed over
             text = f"object {number} was in a part that is not known"
             self.document.add(Kind.MISSING, "osg-reference", statement, label, text)
-            return
+            return None
         definitions[number] = statement
         self.count += 1
         if self.count > _OBJECTS_PER_NODE * self.limits.nodes:
             raise self._error(f"more than {_OBJECTS_PER_NODE * self.limits.nodes} objects")
-        outer, self.end = self.end, end
-        try:
-            if fields is None:
-                raise UnknownPartError(self.at, f"{label} is no class that is known here")
-            yield from self._fields(fields, inner, label)
-        except (UnknownPartError, DamagedError) as problem:
-            if not self.layout.sizes:
-                raise
-            text = f"{problem}; {end - self.at} bytes are passed over"
-            kind = Kind.INVALID if isinstance(problem, DamagedError) else Kind.DROPPED
-            self.document.add(kind, "osg-unread", statement, label, text)
-        self.end = outer
-        if self.layout.sizes:
-            self.at = end
+        if fields is not None:
+            return _Opened(self._fields(fields, inner, label), statement, end)
+        problem = UnknownPartError(self.at, f"{label} is no class that is known here")
+        if not self.layout.sizes:
+            raise problem
+        self._unread(statement, problem, end)
+        self.at = end
+        return None
 
     def _plan(self, label: str) -> tuple[Field, ...] | None:
         """The fields of a class; None if it is not known."""
@@ -165,7 +160,7 @@ class _Objects(Bytes):
         """Read the fields of a class into a block."""
         statements = block.statements
         data, passed = self.data, 0
-        for name, optional, layout, absent, skipped in fields:
+        for name, optional, layout, absent, skipped, code in fields:
             if passed:
                 passed -= 1
                 continue
@@ -179,20 +174,30 @@ class _Objects(Bytes):
             if optional and not self.flag():
                 continue
             place = self.at
-            code = layout[0].code if layout else ""
             if code == "O":
                 if self.flag():
                     inner = Block()
                     statements.append(Statement([name, "TRUE"], place, inner))
                     yield self._object(inner)
-            elif code == "s" and len(layout) == 1:
+            elif code == "s":
                 text = self.text()
                 if text:
                     statements.append(Statement([name, text], place))
-            elif code in DTYPES and len(layout) == 1:
+            elif code in DTYPES:
                 statements.append(Statement([name, *self.words(layout[0])], place))
             elif code == "[":
-                yield from self._vector(name, layout[0].inside, statements)
+                count, items = self.number(), layout[0].inside
+                if not count:
+                    continue
+                line = Statement([name, str(count)], place)
+                statements.append(line)
+                if items[0].code in DTYPES and len(items) == 1:
+                    line.block = self.view(items[0].code, items[0].times, count)
+                else:
+                    yield from self._items(count, items, line)
+            elif code == "-O":
+                if self.flag() and (unread := self._pass_object()) is not None:
+                    yield unread
             elif code == "!":
                 raise UnknownPartError(place, f"{label}: {name} is not known here")
             else:
@@ -200,12 +205,13 @@ class _Objects(Bytes):
                 statements.append(line)
                 yield from self._layout(layout, line, block)
 
-    def _vector(self, name: str, items: tuple[Element, ...], statements: list[Statement]) -> Reader:
-        place, count = self.at, self.number()
-        if count:
-            line = Statement([name, str(count)], place)
-            statements.append(line)
-            yield from self._items(count, items, line)
+    def _pass_object(self) -> _Opened | None:
+        """Pass over an object; one whose size is not known is read, into nothing."""
+        if not self.layout.sizes:
+            return self._object(Block())
+        if self.text_bytes() != b"NULL":
+            self.at = self.open()
+        return None
 
     def _items(self, count: int, layout: tuple[Element, ...], line: Statement) -> Reader:
         """Read ``count`` times what a layout says, into a block of ``line``."""
@@ -310,14 +316,11 @@ class _Objects(Bytes):
         if f"ArrayID {number}" in self.document.definitions:
             return
         kind = self.number()
-        if kind >= len(_ARRAY_TYPES):
+        if kind >= len(ARRAYS):
             raise UnknownPartError(self.at, f"array of type {kind}; want 0 to 31")
-        name, count = _ARRAY_TYPES[kind], self.number()
+        (name, code, width), count = ARRAYS[kind], self.number()
         line.words += [name, str(count)]
         self.open()
-        width, code = 1, _SCALARS.get(name.removesuffix("Array"), name[0].lower())
-        if name.startswith("Vec"):
-            width, code = int(name[3]), _LETTERS[name[4:].removesuffix("Array")]
         line.block = self.view(code, width, count)
         self.document.definitions[f"ArrayID {number}"] = line
         yield from ()
@@ -325,10 +328,10 @@ class _Objects(Bytes):
     def _primitive_set(self, line: Statement) -> Reader:
         """A primitive set that is no object: ``DrawArrays GL_TRIANGLES 0 0 36`` as text."""
         kind, mode = self.number(), self.number()
-        if kind not in _SETS:
+        if kind not in SETS:
             raise UnknownPartError(self.at, f"primitive set of type {kind}; want 50 to 54")
-        name, code = _SETS[kind]
-        line.words += [name, f"GL_{_MODES[mode]}" if mode < len(_MODES) else str(mode)]
+        name, code = SETS[kind]
+        line.words += [name, f"GL_{MODES[mode]}" if mode < len(MODES) else str(mode)]
         if self.layout.version > 96:
             line.words.append(str(self.number()))  # instances
         if kind in (50, 51):

@@ -50,6 +50,7 @@ class Bytes:
         self.end = len(data)  # of the object that is being read
         self.layout = layout
         self._structs: dict[tuple[str, int], struct.Struct] = {}
+        self._dtypes = {code: np.dtype(layout.order + name) for code, name in DTYPES.items()}
         self._uint = struct.Struct(f"{layout.order}I")
         # the size of a block has 8 bytes since version 149
         self.size = struct.Struct(
@@ -66,8 +67,13 @@ class Bytes:
 
     def number(self) -> int:
         """A number of 4 bytes."""
-        begin = self.advance(4)
-        return int(self._uint.unpack_from(self.data, begin)[0])
+        at = self.at
+        if self.end - at < 4:
+            self.advance(4)
+        self.at = at + 4
+        value: int
+        (value,) = self._uint.unpack_from(self.data, at)
+        return value
 
     def flag(self) -> bool:
         """A byte that says whether something follows."""
@@ -75,9 +81,13 @@ class Bytes:
 
     def text(self) -> str:
         """A text after its length."""
+        return decoded(self.text_bytes())
+
+    def text_bytes(self) -> bytes:
+        """A text in its own encoding."""
         count = self.number()
         begin = self.advance(count)
-        return decoded(self.data[begin : begin + count])
+        return self.data[begin : begin + count]
 
     def open(self) -> int:
         """Begin a block; where it ends, or where the one around it does if it has no size."""
@@ -91,7 +101,7 @@ class Bytes:
 
     def view(self, code: str, width: int, count: int) -> Block:
         """A block of ``count`` rows of numbers, which stay where they are."""
-        dtype = np.dtype(self.layout.order + DTYPES[code])
+        dtype = self._dtypes[code]
         begin = self.advance(dtype.itemsize * width * count)
         values = np.frombuffer(self.data, dtype, width * count, begin)
         if code == "b":

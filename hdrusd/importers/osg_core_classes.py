@@ -32,7 +32,7 @@ BlendFunc(Object StateAttribute) SourceRGB:g SourceAlpha:g DestinationRGB:g Dest
 BlendFunci(Object StateAttribute BlendFunc) Index:I
 BoolValueObject(Object) Value:b
 Box(Object Shape) Center:3f HalfLengths:3f Rotation:4d
-BufferData(Object) BufferObject@147-:O
+BufferData(Object) BufferObject@147-:-O
 BufferIndexBinding(Object StateAttribute) Target:g BufferData:O Index:I Size:?! Offset:?!
 BufferObject(Object) Target:g Usage:g CopyDataAndReleaseGLBufferObject:b
 ByteArray(Object BufferData@147- Array) vector:[c]

@@ -9,19 +9,23 @@ for each vertex and as OVERALL when it has one value.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-import numpy.typing as npt
 
-from hdrusd.importers.osg_arrays import ArrayReader, Integers, VertexArray
-from hdrusd.importers.osg_primitives import Polygons, PrimitiveReader
-from hdrusd.importers.osg_text import Document, Doubles, Statement
+from hdrusd.importers.osg_arrays import ArrayReader, VertexArray
+from hdrusd.importers.osg_primitives import Bools, Polygons, PrimitiveReader
+from hdrusd.importers.osg_text import Document, Doubles, Integers, Singles, Statement
 from hdrusd.legacy.scene import Floats, Interpolation, Mesh
 from hdrusd.report import Kind
 
 #: Where float32 cannot hold a coordinate this well, in source units, it is said.
 _PRECISION = 1e-3
+#: And up to here it always can: it rounds a number by at most its 2^-24th part.
+_PRECISE = _PRECISION * 2.0**23
+#: Vertex attributes that have no home, by the names of their fields through the versions.
+_UNUSED = tuple(
+    (f"{stem}array", f"{stem}arraylist", f"{stem}data")
+    for stem in ("secondarycolor", "fogcoord", "vertexattrib")
+)
 
 
 def uv_set(unit: int) -> str:
@@ -50,62 +54,52 @@ class GeometryReader:
         if vertices is None or not len(vertices.values):
             document.add(Kind.DROPPED, "osg-no-vertices", geometry, name, "no vertices; left out")
             return None
-        points = self._points(vertices, name)
+        points, finite = self._points(vertices, name)
         indices = vertices.indices
         polygons = self.primitives.read(geometry, len(points) if indices is None else len(indices))
         corners = polygons.elements if indices is None else indices[polygons.elements]
-        finite = np.logical_and.reduce(np.isfinite(points), axis=1)
-        good = (corners >= 0) & (corners < len(points))
-        if not finite.all():
-            good[good] = finite[corners[good]]
-        if not good.all():
-            first = np.cumsum(polygons.counts) - polygons.counts
-            keep = np.logical_and.reduceat(good, first)
-            corners = corners[np.repeat(keep, polygons.counts)]
-            polygons = polygons.keep(keep)
-            text = f"{int((~keep).sum())} faces without a finite position; left out"
-            document.add(Kind.INVALID, "osg-vertex", geometry, name, text)
+        if indices is not None or not finite:
+            keep = polygons.where(_finite(points, corners))
+            if not keep.all():
+                corners = corners[np.repeat(keep, polygons.counts)]
+                polygons = polygons.keep(keep)
+                text = f"{int((~keep).sum())} faces without a finite position; left out"
+                document.add(Kind.INVALID, "osg-vertex", geometry, name, text)
         if not len(polygons.counts):
             document.add(Kind.DROPPED, "osg-no-faces", geometry, name, "no faces; left out")
             return None
-        mesh = Mesh(
-            name,
-            document.ref(geometry),
-            points if finite.all() else np.where(np.isfinite(points), points, np.float32(0.0)),
-            polygons.counts.astype(np.int32),
-            corners.astype(np.int32),
-        )
         attributes = _Attributes(document, name, vertices, polygons)
-        return self._with_attributes(mesh, geometry, attributes)
-
-    def _with_attributes(self, mesh: Mesh, geometry: Statement, reader: _Attributes) -> Mesh:
-        normals = self.arrays.array(geometry, "Normal")
-        if normals is not None:
-            found = reader.read("normals", normals, 3)
-            if found is not None:
-                mesh = replace(mesh, normals=found[0], normals_interpolation=found[1])
-        colors = self.arrays.array(geometry, "Color")
-        if colors is not None:
-            found = reader.read("colours", colors, 4)
-            if found is not None:
-                mesh = replace(mesh, colors=found[0], colors_interpolation=found[1])
+        normals = attributes.read("normals", self.arrays.array(geometry, "Normal"), 3)
+        colors = attributes.read("colours", self.arrays.array(geometry, "Color"), 4)
         uvs = {}
         for unit, coordinates in self.arrays.texture_coordinates(geometry).items():
-            found = reader.read(f"texture coordinates {unit}", coordinates, 2)
+            found = attributes.read(f"texture coordinates {unit}", coordinates, 2)
             if found is not None:
                 uvs[uv_set(unit)] = found
-        for stem in ("secondarycolor", "fogcoord", "vertexattrib"):
-            keys = f"{stem}array", f"{stem}arraylist", f"{stem}data"
-            other = self.document.field(geometry, *keys)
-            if other is not None:
-                text = f"{other.words[0]}: dropped"
-                self.document.add(Kind.DROPPED, "osg-vertex-attribute", other, mesh.name, text)
-        return replace(mesh, uvs=uvs)
+        for keys in _UNUSED:
+            unused = document.field(geometry, *keys)
+            if unused is not None:
+                text = f"{unused.words[0]}: dropped"
+                document.add(Kind.DROPPED, "osg-vertex-attribute", unused, name, text)
+        return Mesh(
+            name,
+            document.ref(geometry),
+            points if finite else np.where(np.isfinite(points), points, np.float32(0.0)),
+            polygons.counts.astype(np.int32),
+            corners.astype(np.int32),
+            normals=None if normals is None else normals[0],
+            normals_interpolation="vertex" if normals is None else normals[1],
+            uvs=uvs,
+            colors=None if colors is None else colors[0],
+            colors_interpolation="vertex" if colors is None else colors[1],
+        )
 
-    def _points(self, vertices: VertexArray, name: str) -> Floats:
+    def _points(self, vertices: VertexArray, name: str) -> tuple[Floats, bool]:
+        """The points in 32 bits, and whether all are finite."""
         values = _columns(vertices.values, 3, 0.0)
-        with np.errstate(over="ignore"):  # infinite in float32: those faces are dropped
-            points = values.astype(np.float32)
+        points = _single(values)
+        if np.maximum.reduce(np.abs(points), axis=None) <= _PRECISE:  # False for NaN
+            return points, True
         with np.errstate(invalid="ignore"):
             lost = np.abs(values - points)
         lost = lost.max(initial=0.0, where=np.isfinite(lost))
@@ -117,7 +111,15 @@ class GeometryReader:
                 name,
                 f"coordinates rounded to 32 bits, by up to {lost:.3g} units",
             )
-        return points
+        return points, bool(np.isfinite(points).all())
+
+
+def _finite(points: Floats, corners: Integers) -> Bools:
+    """Whether a corner is a point, and a finite one."""
+    finite = np.logical_and.reduce(np.isfinite(points), axis=1)
+    good = (corners >= 0) & (corners < len(points))
+    good[good] = finite[corners[good]]
+    return good
 
 
 class _Attributes:
@@ -132,17 +134,19 @@ class _Attributes:
         self.polygons = polygons
 
     def read(
-        self, role: str, attribute: VertexArray, width: int
+        self, role: str, attribute: VertexArray | None, width: int
     ) -> tuple[Floats, Interpolation] | None:
         """Values (., width) float32 and their interpolation; None, with a finding, if unusable."""
+        if attribute is None:
+            return None
         binding = self._binding(role, attribute)
         values = attribute.values if width == 2 else attribute.normalised()
         if binding in ("OFF", "UNDEFINED"):
             if binding == "UNDEFINED":
                 self._drop(attribute, role, f"{len(values)} values and no binding")
             return None
-        with np.errstate(over="ignore"):
-            rows = _columns(values, width, 1.0 if width == 4 else 0.0).astype(np.float32)
+        rows = _single(_columns(values, width, 1.0 if width == 4 else 0.0))
+        picked: Integers | slice
         interpolation: Interpolation
         if binding == "OVERALL":
             picked, interpolation = np.zeros(1, dtype=np.int64), "constant"
@@ -155,10 +159,14 @@ class _Attributes:
         else:
             self._drop(attribute, role, f"binding {binding} is unknown")
             return None
-        if attribute.indices is not None and interpolation in ("constant", "uniform"):
-            picked = _taken(attribute.indices, picked)
-        if len(picked) and (picked.min() < 0 or picked.max() >= len(rows)):
-            self._drop(attribute, role, f"{len(rows)} values; want {int(picked.max()) + 1}")
+        if isinstance(picked, slice):
+            first, wanted = 0, picked.stop
+        else:
+            if attribute.indices is not None and interpolation in ("constant", "uniform"):
+                picked = _taken(attribute.indices, picked)
+            first, wanted = picked.min(initial=0), int(picked.max(initial=-1)) + 1
+        if first < 0 or wanted > len(rows):
+            self._drop(attribute, role, f"{len(rows)} values; want {wanted}")
             return None
         rows = rows[picked]
         if not np.isfinite(rows).all():
@@ -181,7 +189,7 @@ class _Attributes:
             )
         return guess or "UNDEFINED"
 
-    def _per_vertex(self, attribute: VertexArray) -> tuple[Integers, Interpolation]:
+    def _per_vertex(self, attribute: VertexArray) -> tuple[Integers | slice, Interpolation]:
         own, shared = attribute.indices, self.vertices.indices
         same = own is shared or (
             own is not None and shared is not None and np.array_equal(own, shared)
@@ -191,7 +199,7 @@ class _Attributes:
             if extra > 0:
                 text = f"{extra} values more than vertices; those are left out"
                 self.document.add(Kind.INVALID, "osg-count", attribute.place, self.name, text)
-            return np.arange(len(self.vertices.values), dtype=np.int64), "vertex"
+            return slice(len(self.vertices.values)), "vertex"
         elements = self.polygons.elements
         return elements if own is None else _taken(own, elements), "faceVarying"
 
@@ -206,9 +214,21 @@ def _taken(indices: Integers, elements: Integers) -> Integers:
     return np.where(inside, indices[np.where(inside, elements, 0)] if len(indices) else -1, -1)
 
 
-def _columns(values: Doubles, width: int, fill: float) -> npt.NDArray[np.float64]:
+def _single(values: Singles | Doubles) -> Floats:
+    """A copy in 32 bits; infinite where they cannot hold a number."""
+    if values.dtype == np.float32:
+        return values.astype(np.float32)
+    with np.errstate(over="ignore"):
+        return values.astype(np.float32)
+
+
+def _columns(values: Singles | Doubles, width: int, fill: float) -> Singles | Doubles:
     """Rows of ``width`` numbers: further ones cut, missing ones ``fill``."""
     have = values.shape[1]
-    if have >= width:
+    if have == width:
+        return values
+    if have > width:
         return values[:, :width]
-    return np.pad(values, ((0, 0), (0, width - have)), constant_values=fill)
+    padded = np.full((len(values), width), fill, values.dtype)
+    padded[:, :have] = values
+    return padded

@@ -71,7 +71,8 @@ class Field(NamedTuple):
     """A field of a class in one version, or several that are passed over.
 
     ``absent``: how many fields from this one on are behind a byte that may be 0. ``skipped``:
-    bytes of fields that nothing here reads.
+    bytes of fields that nothing here reads. ``code``: of the layout where that has one element,
+    ``-O`` for an object that nothing here reads.
     """
 
     name: str
@@ -79,6 +80,7 @@ class Field(NamedTuple):
     layout: tuple[Element, ...]
     absent: int = 0
     skipped: int = 0
+    code: str = ""
 
 
 class Declared(NamedTuple):
@@ -112,11 +114,13 @@ def plan(label: str, version: int, schema: dict[str, list[str]]) -> tuple[Field,
 
 def _field(declared: Declared) -> Field:
     layout = _parse(declared.layout.lstrip("?-"))
-    if declared.layout.startswith("-"):
+    code = layout[0].code if len(layout) == 1 else ""
+    unread = declared.layout.startswith("-")
+    if unread and code != "O":
         return Field(declared.name, False, layout, skipped=sum(e.size or 0 for e in layout))
     optional = declared.layout.startswith("?")
-    flagged = optional or (len(layout) == 1 and layout[0].code == "O")
-    return Field(declared.name, optional, layout, absent=int(flagged))
+    absent = int(optional or code == "O")
+    return Field(declared.name, optional, layout, absent, code=f"-{code}" if unread else code)
 
 
 def _joined(fields: list[Field]) -> list[Field]:

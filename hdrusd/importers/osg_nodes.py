@@ -7,6 +7,7 @@ Sequence, Billboard, ProxyNode, Node; osgSim's MultiSwitch.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -42,11 +43,23 @@ NODES = {
     *GEODES,
 }
 _CALLBACKS = ("eventcallback", "eventcallbacks", "cullcallback", "cullcallbacks")
+_DESCRIPTIONS = ("udcdescriptions", "descriptions", "description")
+#: Fields that few nodes have.
+_NOTED = frozenset({*_CALLBACKS, "userdatacontainer", *_DESCRIPTIONS})
 _SETS = 256  # of a MultiSwitch that are kept
 _ORIGIN: Vec3 = (0.0, 0.0, 0.0)
 _ALWAYS = (0.0, float(np.finfo(np.float32).max))  # osg::LOD takes FLT_MAX for "for ever"
 
 NodeKind = Literal["group", "lod", "switch", "sequence", "billboard"]
+
+
+@dataclass(frozen=True, slots=True)
+class External:
+    """A file that stands in the place of a child."""
+
+    name: str  # as written
+    folder: str  # the node's DatabasePath; "" where it has none
+    place: Statement  # of the node
 
 
 @dataclass(slots=True)
@@ -58,7 +71,7 @@ class Description:
     visible: bool
     placement: Placement
     kind: NodeKind = "group"
-    children: list[Statement | None] = field(default_factory=list)  # None: refers to nothing
+    children: list[Statement | External | None] = field(default_factory=list)  # None: to nothing
     lod_ranges: tuple[tuple[float, float], ...] = ()
     lod_on_screen: bool = False
     switch_on: tuple[bool, ...] = ()
@@ -93,7 +106,7 @@ class NodeReader:
             return made
         if placement.faces_viewer:
             made.kind = "billboard"
-        made.children = self._list(place, "children", "num_children")
+        made.children += self._list(place, "children", "num_children")
         if kind in GEODES:
             self._geode(made)
         elif kind in ("LOD", "PagedLOD"):
@@ -145,6 +158,8 @@ class NodeReader:
     def _notes(self, made: Description) -> None:
         """Descriptions as extras; callbacks and user data that are dropped."""
         document, place = self.document, made.place
+        if place.block is None or _NOTED.isdisjoint(place.block.fields):
+            return
         for key in _CALLBACKS:
             found = document.field(place, key)
             if found is not None and found.block is not None:
@@ -155,7 +170,7 @@ class NodeReader:
             self._add(Kind.DROPPED, "osg-user-data", made, "user data objects; dropped")
         holder = place if container is None else container
         texts: list[str] = []
-        for key in ("udcdescriptions", "descriptions", "description"):
+        for key in _DESCRIPTIONS:
             found = document.field(holder, key)
             if found is not None and found.block is not None:
                 texts += [" ".join(s.words) for s in found.block.statements]
@@ -166,24 +181,26 @@ class NodeReader:
 
     def _geode(self, made: Description) -> None:
         drawables = self._list(made.place, "drawables", "num_drawables")
-        where = np.zeros((len(drawables), 3))
+        where = [_ORIGIN] * len(drawables)
         if made.place.class_name == "Billboard":
             made.kind = "billboard"
             text = "billboard: turns with the viewer; kept at rest"
             self._add(Kind.REPLACED, "osg-billboard", made, text)
             positions = self._numbers(made.place, "positionlist", "positions")
             positions = positions[: min(len(positions) // 3, len(drawables)) * 3].reshape(-1, 3)
-            where[: len(positions)] = np.where(np.isfinite(positions), positions, 0.0)
-        for drawable, (x, y, z) in zip(drawables, where.tolist(), strict=True):
+            rows = np.where(np.isfinite(positions), positions, 0.0).tolist()
+            where[: len(rows)] = [(x, y, z) for x, y, z in rows]
+        for drawable, place in zip(drawables, where, strict=True):
             if drawable is not None and drawable.class_name in DRAWABLES:
-                made.drawables.append((drawable, (x, y, z)))
+                made.drawables.append((drawable, place))
             elif drawable is not None:
                 text = f"{drawable.label}: no such drawable is kept; left out"
                 self.document.add(Kind.DROPPED, "osg-drawable", drawable, made.name, text)
 
     def _lod(self, made: Description) -> None:
-        document, place, count = self.document, made.place, len(made.children)
-        files = self._files(made) if place.class_name == "PagedLOD" else []
+        document, place = self.document, made.place
+        places = self._files(made) if place.class_name == "PagedLOD" else None
+        count = len(made.children)
         pixels = document.word(place, "rangemode") == "PIXEL_SIZE_ON_SCREEN"
         if pixels:
             text = "ranges are sizes on the screen in pixels; their inverse stands for a distance"
@@ -192,9 +209,8 @@ class NodeReader:
         if document.field(place, "rangelist") is None:  # before 2002: the limits between levels
             numbers = np.repeat(self._numbers(place, "ranges"), 2)[1:-1]
         pairs = numbers[: len(numbers) // 2 * 2].reshape(-1, 2)
-        if "" in files:  # the ranges of external files lie between those of the children
-            inside = np.array([not file for file in files[: len(pairs)]], dtype=np.bool_)
-            pairs = pairs[: len(inside)][inside]
+        if places is not None:
+            pairs = pairs[[number for number in places if number < len(pairs)]]
         pairs = pairs[:count]
         usable = np.isfinite(pairs).all(axis=1)
         if len(pairs) < count or not usable.all():
@@ -237,17 +253,33 @@ class NodeReader:
         text = f"sequence of {len(made.children)} nodes; the first is selected, nothing runs"
         self._add(Kind.REPLACED, "osg-sequence", made, text)
 
-    def _files(self, made: Description) -> list[str]:
-        """The files that a PagedLOD or ProxyNode refers to; "" stands for a child in this file."""
+    def _files(self, made: Description) -> list[int]:
+        """Put the files that a PagedLOD or ProxyNode names in their places among the children.
+
+        "" stands for a child in this file. Of a ProxyNode whose files' contents stand here too,
+        those are used. Returns the place of each child among the names.
+        """
         found = self.document.field(made.place, "rangedatalist", "filenames", "filenamelist")
         block = None if found is None else found.block
-        files = [s.words[0] if s.words else "" for s in block.statements] if block else []
-        named = [file for file in files if file]
-        if named:
-            text = f"external files are not read: {', '.join(named)}"
-            self._add(Kind.MISSING, "osg-external", made, text)
-            made.extras["files"] = tuple(named)
-        return files
+        names = [s.words[0] if s.words else "" for s in block.statements] if block else []
+        here = deque(made.children)
+        if made.place.class_name == "ProxyNode" and len(here) > names.count(""):
+            names[: len(here)] = [""] * min(len(here), len(names))
+        folder = self._database_path(made.place)
+        children: list[Statement | External | None] = []
+        places = []
+        for number, name in enumerate(names):
+            if name or here:
+                children.append(External(name, folder, made.place) if name else here.popleft())
+                places.append(number)
+        made.children = [*children, *here]
+        return [*places, *range(len(names), len(names) + len(here))]
+
+    def _database_path(self, place: Statement) -> str:
+        """``DatabasePath TRUE "tiles/"``, in .osg and for a ProxyNode without the flag."""
+        found = self.document.field(place, "databasepath")
+        words = [] if found is None else found.words[1:]
+        return "" if words[:1] == ["FALSE"] or not words else words[-1]
 
     def _render_pass(self, made: Description) -> None:
         found = render_camera(self.document, made.place, made.name)

@@ -19,8 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.errors import InputError
-from hdrusd.importers.osg_arrays import Integers, whole
-from hdrusd.importers.osg_text import Document, Statement
+from hdrusd.importers.osg_text import Document, Integers, Statement
 from hdrusd.report import Kind
 
 Bools = npt.NDArray[np.bool_]
@@ -35,6 +34,8 @@ _KINDS = {
     "DrawElementsUShort",
     "DrawElementsUInt",
 }
+#: Modes whose figures share no elements.
+_SEPARATE = ("TRIANGLES", "QUADS")
 _MODES = ("TRIANGLES", "TRIANGLE_STRIP", "TRIANGLE_FAN", "QUADS", "QUAD_STRIP", "POLYGON")
 #: Elements of the smallest figure, elements that each further one takes.
 _STEPS = {
@@ -65,6 +66,12 @@ class Polygons:
             self.sets[faces],
             self.primitives[faces],
         )
+
+    def where(self, corners: Bools) -> Bools:
+        """The faces of which all corners are True."""
+        if not len(self.counts):
+            return np.zeros(0, dtype=np.bool_)
+        return np.logical_and.reduceat(corners, np.cumsum(self.counts) - self.counts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +106,7 @@ class PrimitiveReader:
             part = self._polygons(item, elements)
             part.sets += number
             part.primitives += primitive
-            own = item.mode in ("TRIANGLES", "QUADS")
-            primitive += len(part.counts) if own else len(item.lengths)
+            primitive += len(part.counts) if item.mode in _SEPARATE else len(item.lengths)
             parts.append(part)
         for mode, count in undrawn.items():
             self.document.add(
@@ -110,9 +116,11 @@ class PrimitiveReader:
                 self.document.name(geometry),
                 f"{count} primitive sets of {mode}; only faces are kept",
             )
-        empty = np.zeros(0, dtype=np.int64)
         if not parts:
+            empty = np.zeros(0, dtype=np.int64)
             return Polygons(empty, empty, empty, empty)
+        if len(parts) == 1:
+            return parts[0]
         return Polygons(
             np.concatenate([part.counts for part in parts]),
             np.concatenate([part.elements for part in parts]),
@@ -153,14 +161,15 @@ class PrimitiveReader:
     def _object(self, place: Statement) -> _PrimitiveSet:
         """``osg::DrawArrays { UniqueID 3 Mode TRIANGLES Count 36 }``; left out is 0, or POINTS."""
         mode = (self.document.word(place, "mode") or "POINTS").removeprefix("GL_")
-        first, count = (
-            int(np.clip(self.document.number(place, 0.0, key), -_MOST, _MOST))
-            for key in ("first", "count")
-        )
+        first = self._whole(place, "first")
         if place.class_name == "DrawArrays":
+            count = self._whole(place, "count")
             return _PrimitiveSet(place, mode, None, first, np.array([count]))
         vector = self.document.field(place, "vector")
         return self._block(place, mode, vector, first, None if vector is None else vector.declared)
+
+    def _whole(self, place: Statement, key: str) -> int:
+        return int(min(max(self.document.number(place, 0.0, key), -_MOST), _MOST))
 
     def _block(
         self,
@@ -171,7 +180,7 @@ class PrimitiveReader:
         declared: int | None,
     ) -> _PrimitiveSet:
         block = None if holder is None else holder.block
-        values = np.zeros(0, dtype=np.int64) if block is None else whole(block.numbers())
+        values = np.zeros(0, dtype=np.int64) if block is None else block.indices()
         self._spend(len(values), place)
         if declared is not None and declared != len(values):
             self.document.add(
@@ -195,16 +204,21 @@ class PrimitiveReader:
         lengths = self._clamped(item, available)
         if item.elements is None:
             self._spend(int(lengths.sum()), item.place)
-        starts = item.first + np.concatenate([[0], np.cumsum(lengths)[:-1]]).astype(np.int64)
-        counts, positions, run = faces(item.mode, starts, lengths)
-        corners = positions if item.elements is None else item.elements[positions]
-        own = item.mode in ("TRIANGLES", "QUADS")
-        primitives = np.arange(len(counts), dtype=np.int64) if own else run
+        separate = item.mode in _SEPARATE
+        if separate and len(lengths) == 1:
+            counts, corners = _single_run(item, int(lengths[0]))
+            run = counts
+        else:
+            starts = item.first + np.concatenate([[0], np.cumsum(lengths)[:-1]]).astype(np.int64)
+            counts, corners, run = faces(item.mode, starts, lengths)
+            corners = corners if item.elements is None else item.elements[corners]
+        primitives = np.arange(len(counts), dtype=np.int64) if separate else run
         made = Polygons(counts, corners, np.zeros(len(counts), dtype=np.int64), primitives)
         if item.mode == "TRIANGLE_STRIP":
             made = _without_stitches(made)
-        valid = _faces_where(made, (made.elements >= 0) & (made.elements < elements))
-        if not valid.all():
+        corners = made.elements
+        if corners.min(initial=0) < 0 or corners.max(initial=-1) >= elements:
+            valid = made.where((corners >= 0) & (corners < elements))
             self.document.add(
                 Kind.INVALID,
                 "osg-index",
@@ -219,6 +233,8 @@ class PrimitiveReader:
     def _clamped(self, item: _PrimitiveSet, available: int) -> Integers:
         """Lengths of the runs that the elements suffice for. Declared counts may be absurd."""
         room = max(available - item.first, 0) if item.first >= 0 else 0
+        if len(item.lengths) == 1 and 0 <= item.lengths[0] <= room:
+            return item.lengths
         lengths = np.clip(item.lengths, 0, room)
         if len(lengths) > 1:
             before = np.concatenate([[0], np.cumsum(lengths)[:-1]])
@@ -234,6 +250,18 @@ class PrimitiveReader:
                 f"{int(lengths.sum())} are drawn",
             )
         return lengths
+
+
+def _single_run(item: _PrimitiveSet, length: int) -> tuple[Integers, Integers]:
+    """Corner counts and corners of separate figures: the elements as they follow one another."""
+    width, _ = _STEPS[item.mode]
+    count = length // width
+    end = item.first + count * width
+    if item.elements is None:
+        corners = np.arange(item.first, end, dtype=np.int64)
+    else:
+        corners = item.elements[item.first : end]
+    return np.full(count, width, dtype=np.int64), corners
 
 
 def faces(mode: str, starts: Integers, lengths: Integers) -> tuple[Integers, Integers, Integers]:
@@ -273,10 +301,3 @@ def _without_stitches(made: Polygons) -> Polygons:
     """Strips are joined by triangles without area that name a vertex twice; nothing is lost."""
     a, b, c = made.elements.reshape(-1, 3).T
     return made.keep((a != b) & (b != c) & (a != c))
-
-
-def _faces_where(made: Polygons, corners: Bools) -> Bools:
-    """The faces of which all corners are True."""
-    if not len(made.counts):
-        return np.zeros(0, dtype=np.bool_)
-    return np.logical_and.reduceat(corners, np.cumsum(made.counts) - made.counts)

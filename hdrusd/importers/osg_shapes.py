@@ -13,8 +13,7 @@ import math
 
 import numpy as np
 
-from hdrusd.importers.osg_arrays import Integers
-from hdrusd.importers.osg_text import Document, Doubles, Statement
+from hdrusd.importers.osg_text import Document, Doubles, Integers, Statement
 from hdrusd.importers.osg_transforms import rotation_matrix
 from hdrusd.legacy.scene import Mesh
 from hdrusd.report import Kind

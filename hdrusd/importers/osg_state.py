@@ -73,12 +73,24 @@ _HINTS: dict[str | None, Hint] = {
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A mode that is ``on`` or an attribute that stands at ``place``."""
+    """A mode that is ``on`` or an attribute that stands at ``place`` of ``document``.
 
+    Which need not be the file that it holds in: a file may be part of another.
+    """
+
+    document: Document
     place: Statement
     on: bool
     override: bool = False
     protected: bool = False
+
+    def word(self, *keys: str) -> str | None:
+        """The second word of a field."""
+        return self.document.word(self.place, *keys)
+
+    def add(self, kind: Kind, code: str, thing: str, text: str) -> None:
+        """Note a finding where it stands."""
+        self.document.add(kind, code, self.place, thing, text)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,10 +105,9 @@ class RenderState:
         found = self.settings.get((unit, name))
         return None if found is None else found.on
 
-    def attribute(self, name: str, unit: int = NO_UNIT) -> Statement | None:
-        """The statement of an attribute."""
-        found = self.settings.get((unit, name))
-        return None if found is None else found.place
+    def attribute(self, name: str, unit: int = NO_UNIT) -> Setting | None:
+        """Where an attribute stands."""
+        return self.settings.get((unit, name))
 
     def units(self) -> list[int]:
         """The units that have a texture, in order."""
@@ -128,6 +139,14 @@ class StateReader:
         key = id(inherited), id(place)
         if key not in self._sums:
             self._sums[key] = inherited.below(self.own(place))
+        return self._sums[key]
+
+    def below_light(self, inherited: RenderState, source: Statement, mode: str) -> RenderState:
+        """The state below a LightSource: its own state set is made anew with its light on."""
+        key = id(inherited), id(source)
+        if key not in self._sums:
+            on = RenderState({(NO_UNIT, mode): Setting(self.document, source, True)})
+            self._sums[key] = inherited.below(on)
         return self._sums[key]
 
     def own(self, place: Statement) -> RenderState:
@@ -209,7 +228,10 @@ class StateReader:
             if on:
                 self._dropped(place, name)
             return
-        yield (unit, name), Setting(place, on, "OVERRIDE" in flags, "PROTECTED" in flags)
+        yield (
+            (unit, name),
+            Setting(self.document, place, on, "OVERRIDE" in flags, "PROTECTED" in flags),
+        )
 
     def _attribute(self, place: Statement, flags: str, unit: int) -> Iterator[tuple[Key, Setting]]:
         name = place.class_name
@@ -220,7 +242,10 @@ class StateReader:
         parts = flags.split("|")
         if "INHERIT" in parts:
             return
-        yield (unit, kind), Setting(place, True, "OVERRIDE" in parts, "PROTECTED" in parts)
+        yield (
+            (unit, kind),
+            Setting(self.document, place, True, "OVERRIDE" in parts, "PROTECTED" in parts),
+        )
 
     def _dropped(self, place: Statement, what: str) -> None:
         text = "render state that has no home; dropped"

@@ -30,15 +30,27 @@ import numpy.typing as npt
 
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.importers.importer import Limits
+from hdrusd.importers.number_text import wholes
 from hdrusd.report import Kind, Report
 
 Doubles = npt.NDArray[np.float64]
+Singles = npt.NDArray[np.float32]
+Integers = npt.NDArray[np.int64]
 
-#: White space, then words up to the end of the line or a mark, then that mark.
-_SEGMENT = re.compile(rb'(\s*+)((?:[^\s{}"][^\n{}"]*+)?+)([\n{}"]?+)')
-_NUMBERS = re.compile(rb"\{([\s0-9eE+.\-]*+)\}")
-_STRING = re.compile(rb'"((?:[^"\\]++|\\.)*+)"', re.DOTALL)
+#: White space, words up to the end of the line or a mark, and what is there: the end of the line,
+#: a block of numbers alone, one of how a renderer buffers an array, which nothing here reads, the
+#: begin of another block, its end, a string, one that is not closed.
+_SEGMENT = re.compile(
+    rb'(\s*+)((?:[^\s{}"][^\n{}"]*+)?+)'
+    rb"(?:(\n)|\{([0-9 \n\t\r\f\veE+.\-]*+)\}"
+    rb'|(?<=BufferObject TRUE )(\{[^{}"]*+\{[^{}"]*+\}[^{}"]*+\})|(\{)|(\})'
+    rb'|"((?:[^"\\]++|\\.)*+)"|("))?+',
+    re.DOTALL,
+)
+_LINE_END, _NUMBERS, _UNREAD, _OPEN, _CLOSE, _STRING, _UNCLOSED = range(3, 10)  # its groups
+_DIGITS = b"0123456789 \n\t\r\f\v"
 _ESCAPE = re.compile(rb"\\(.)", re.DOTALL)
+_INEXACT = 1 << 53  # from here on float64 leaves out whole numbers
 
 
 @dataclass(slots=True, eq=False)
@@ -84,13 +96,18 @@ class Block:
     data: memoryview | None = None
     _fields: dict[str, Statement] | None = None
 
+    @property
+    def fields(self) -> dict[str, Statement]:
+        """The first statement of each folded first word."""
+        if self._fields is None:
+            self._fields = {
+                fold(s.words[0]) if s.words else "": s for s in reversed(self.statements)
+            }
+        return self._fields
+
     def field(self, key: str) -> Statement | None:
         """The first statement whose folded first word is ``key``."""
-        if self._fields is None:
-            self._fields = {}
-            for statement in self.statements:
-                self._fields.setdefault(statement.key, statement)
-        return self._fields.get(key)
+        return self.fields.get(key)
 
     def numbers(self) -> Doubles:
         """All numbers, in order; NaN for a word among numbers that is none."""
@@ -104,6 +121,25 @@ class Block:
                 return np.array([_number(word.decode()) for word in words])
         lines = [s.words for s in self.statements if s.words and _numeric(s.words[0])]
         return np.array([_number(word) for words in lines for word in words], dtype=np.float64)
+
+    def floats(self) -> Singles | Doubles:
+        """``numbers``, in 32 bits where the file has them so."""
+        if self.values is not None and self.values.dtype.kind == "f" and self.values.itemsize == 4:
+            return self.values.astype(np.float32, copy=False)
+        return self.numbers()
+
+    def indices(self) -> Integers:
+        """``numbers`` as indices; -1, which is no index, for what is none."""
+        if self.values is not None:
+            if self.values.dtype.kind == "u" and self.values.itemsize < 8:
+                return self.values.astype(np.int64)
+        elif not self.statements and not self.raw.translate(None, _DIGITS):
+            found = wholes(self.raw)
+            if found is not None and found.max(initial=0) < _INEXACT:
+                return found
+        numbers = self.numbers()
+        good = (numbers >= 0.0) & (numbers < _INEXACT)  # False for NaN
+        return np.where(good, numbers, -1.0).astype(np.int64)
 
 
 @lru_cache(4096)
@@ -177,10 +213,10 @@ class Document:
         """The first field of ``owner`` under any of the folded names."""
         if owner.block is None:
             return None
+        fields = owner.block.fields
         for key in keys:
-            found = owner.block.field(key)
-            if found is not None:
-                return found
+            if key in fields:
+                return fields[key]
         return None
 
     def word(self, owner: Statement, *keys: str) -> str | None:
@@ -253,26 +289,32 @@ class _Parser:
 
     def run(self) -> None:
         """Fill the document. Raises InputError."""
-        data, position, end = self.data, 0, len(self.data)
-        while position < end:
-            found = _SEGMENT.match(data, position)
-            assert found is not None  # every part of the pattern may be empty
-            blank, text, mark = found.groups()
+        for found in _SEGMENT.finditer(self.data):
+            blank, text = found.group(1, 2)
             if b"\n" in blank:
                 self.line += blank.count(b"\n")
                 self.current = None
             if text:
                 self._words(text)
-            position = found.end()
-            if mark == b"\n":
+            what = found.lastindex
+            if what == _LINE_END:
                 self.line += 1
                 self.current = None
-            elif mark == b'"':
-                position = self._string(position - 1)
-            elif mark == b"{":
-                position = self._open(position - 1)
-            elif mark == b"}":
+            elif what == _CLOSE:
                 self._close()
+            elif what == _OPEN:
+                self._open()
+            elif what == _NUMBERS:
+                numbers = found[_NUMBERS]
+                self._owner().block = Block(raw=numbers)
+                self.line += numbers.count(b"\n")
+            elif what == _UNREAD:
+                self._owner().block = Block()
+                self.line += found[_UNREAD].count(b"\n")
+            elif what == _STRING:
+                self._string(found[_STRING])
+            elif what == _UNCLOSED:
+                raise self._error('text: not closed; want "', self.line)
         if self.stack:
             raise self._error(
                 f"{self.stack[-1][0].label}: block not closed; want }}",
@@ -297,16 +339,12 @@ class _Parser:
         else:
             self.current.words.extend(words)
 
-    def _string(self, position: int) -> int:
-        found = _STRING.match(self.data, position)
-        if found is None:
-            raise self._error('text: not closed; want "', self.line)
-        text = found[1]
+    def _string(self, text: bytes) -> None:
         self._append([decoded(_ESCAPE.sub(rb"\1", text) if b"\\" in text else text)])
         self.line += text.count(b"\n")
-        return found.end()
 
-    def _open(self, position: int) -> int:
+    def _owner(self) -> Statement:
+        """What the block that begins here belongs to; words behind it begin a statement."""
         owner = self.current
         if owner is None:  # a brace on a line of its own belongs to the line before
             last = self.block.statements[-1] if self.block.statements else None
@@ -315,19 +353,17 @@ class _Parser:
             else:
                 owner = Statement([], self.line)
                 self.block.statements.append(owner)
-        self._define(owner)
+        if len(owner.words) > 1:
+            self._define(owner)
         self.current = None
-        found = _NUMBERS.match(self.data, position)
-        if found is not None:
-            owner.block = Block(raw=found[1])
-            self.line += found[1].count(b"\n")
-            return found.end()
-        owner.block = Block()
+        return owner
+
+    def _open(self) -> None:
+        owner = self._owner()
         self.stack.append((owner, self.block))
         if len(self.stack) > self.limits.depth:
             raise self._error(f"blocks deeper than {self.limits.depth}", self.line)
-        self.block = owner.block
-        return position + 1
+        owner.block = self.block = Block()
 
     def _define(self, owner: Statement) -> None:
         """Arrays carry their identity in the line: ``UniqueID Vec2Array_6 Vec2Array 3 {``."""

@@ -17,13 +17,14 @@ import binascii
 import math
 import struct
 from dataclasses import dataclass, field
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 import numpy.typing as npt
 
 from hdrusd.importers.importer import Resolver
 from hdrusd.importers.osg_geometry import uv_set
+from hdrusd.importers.osg_state import Setting
 from hdrusd.importers.osg_text import Document, Statement
 from hdrusd.legacy.scene import Image, Texture, UVTransform, Wrap
 from hdrusd.report import Kind
@@ -56,30 +57,29 @@ _NO_ALPHA = {".jpg", ".jpeg", ".int"}
 
 @dataclass(slots=True)
 class TextureReader:
-    """Reads the textures of one file; one image has one record however often it is named."""
+    """Reads the textures of one file; one image has one record however often it is named.
+
+    ``files`` are the pictures of the files that a scene is made of: many may name one.
+    """
 
     document: Document
     resolver: Resolver
+    files: dict[Path, Image] = field(default_factory=dict)
     _images: dict[str | int, Image] = field(default_factory=dict)
     _opaque: set[int] = field(default_factory=set)  # images whose format has no alpha
 
     def read(
-        self, texture: Statement, unit: int, environment: Statement | None, matrix: Statement | None
+        self, texture: Statement, unit: int, mode: str, matrix: Setting | None
     ) -> tuple[Texture | None, frozenset[str]]:
         """The texture of a unit and the fields that the file leaves to the format's defaults.
 
-        None, with a finding, where there is no image at all; a missing file keeps its name.
+        ``mode``: of its TexEnv. None, with a finding, where there is no image at all; a missing
+        file keeps its name.
         """
         image = self.image(texture)
         if image is None:
             return None, frozenset()
         wrap_s, wrap_t = self._wrap(texture, "wraps"), self._wrap(texture, "wrapt")
-        mode = "MODULATE"
-        if environment is not None:
-            mode = self.document.word(environment, "mode") or mode
-        if mode != "MODULATE":
-            text = f"texture environment {mode}; kept as a note, shown as MODULATE"
-            self.document.add(Kind.REPLACED, "osg-texture-mode", texture, image.name, text)
         made = Texture(
             image,
             uv_set(unit),
@@ -153,7 +153,8 @@ class TextureReader:
         if name not in self._images:
             source = self.document.ref(place)
             path = self.resolver.find(name, source)
-            self._images[name] = Image(name, source, path=path)
+            made = Image(name, source, path=path)
+            self._images[name] = made if path is None else self.files.setdefault(path, made)
         return self._images[name]
 
     def _inline(self, name: str, place: Statement) -> Image:
@@ -206,14 +207,14 @@ class TextureReader:
         return found
 
     def _transform(
-        self, image: Image, texture: Statement, matrix: Statement | None
+        self, image: Image, texture: Statement, matrix: Setting | None
     ) -> UVTransform | None:
         values: tuple[float, ...] | None = None
-        if matrix is not None and matrix.block is not None:
-            if self.document.field(matrix, "matrix") is not None:
-                values = self.document.numbers(matrix, 16, "matrix")
+        if matrix is not None and matrix.place.block is not None:
+            if matrix.document.field(matrix.place, "matrix") is not None:
+                values = matrix.document.numbers(matrix.place, 16, "matrix")
             else:  # .osg writes the numbers into TexMat itself
-                values = tuple(matrix.block.numbers()[:16].tolist())
+                values = tuple(matrix.place.block.numbers()[:16].tolist())
                 values = values if len(values) == 16 and all(map(math.isfinite, values)) else None
         suffix = PurePosixPath(image.name if image.path is None else image.path.name).suffix
         a_file = image.data is None and image.pixels is None and suffix.lower() == ".dds"
@@ -224,8 +225,10 @@ class TextureReader:
         try:
             return uv_transform(values or _IDENTITY, from_top=from_top)
         except ValueError as error:
-            place = texture if matrix is None else matrix
-            self.document.add(Kind.DROPPED, "osg-texture-matrix", place, image.name, str(error))
+            home, place = self.document, texture
+            if matrix is not None:
+                home, place = matrix.document, matrix.place
+            home.add(Kind.DROPPED, "osg-texture-matrix", place, image.name, str(error))
             return uv_transform(_IDENTITY, from_top=from_top)
 
 

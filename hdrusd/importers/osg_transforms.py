@@ -35,6 +35,7 @@ _TRS_CLASSES = {
     "CameraView": "attitude",
 }
 _TRANSFORMS = {"Transform", "MatrixTransform", "DOFTransform", "LightSource", *_TRS_CLASSES}
+_CALLBACKS = ("updatecallback", "updatecallbacks")
 _ANIMATED = {"MatrixTransform", "PositionAttitudeTransform", "CameraView"}
 
 
@@ -46,6 +47,9 @@ class Placement:
     animation: tuple[Channel, ...] = ()
     pivot: Vec3 = _ORIGIN
     faces_viewer: bool = False
+
+
+_NOWHERE = Placement()
 
 
 class TransformReader:
@@ -64,6 +68,8 @@ class TransformReader:
         kind = node.class_name
         if kind in _TRANSFORMS:
             self._reference_frame(node, name)
+        elif self.document.field(node, *_CALLBACKS) is None:
+            return _NOWHERE
         animation, pivot = self._animation(node, name)
         if animation:
             return Placement(None, animation, pivot)
@@ -73,7 +79,7 @@ class TransformReader:
             return Placement(self._degrees_of_freedom(node, name))
         if kind in _TRS_CLASSES:
             return Placement(self._trs(node, name), faces_viewer=self._faces_viewer(node, name))
-        return Placement()
+        return _NOWHERE
 
     def _reference_frame(self, node: Statement, name: str) -> None:
         frame = self.document.word(node, "referenceframe") or "RELATIVE"
@@ -188,7 +194,7 @@ class TransformReader:
     def _callbacks(self, node: Statement) -> Iterator[Statement]:
         """The update callbacks of a node and those nested in them."""
         document = self.document
-        waiting = [document.field(node, "updatecallback", "updatecallbacks")]
+        waiting = [document.field(node, *_CALLBACKS)]
         seen: set[int] = set()
         while waiting:
             holder = waiting.pop()

@@ -1,6 +1,6 @@
 """Reader for OpenSceneGraph's binary files, ``.osgb``.
 
-What a binary file says is made into the tree of the text form, which ``osg`` reads. A file that
+What a binary file says is made into the tree of the text form. A file that
 has parts which only another program knows, and no block sizes to pass over them, is given to
 osgconv.
 
@@ -14,12 +14,11 @@ import struct
 import zlib
 
 from hdrusd.errors import InputError, SourceRef
-from hdrusd.importers import osg, osgconv
+from hdrusd.importers import osgconv
 from hdrusd.importers.importer import Resolver
 from hdrusd.importers.osg_binary import UnknownPartError, fill
 from hdrusd.importers.osg_bytes import Layout
 from hdrusd.importers.osg_text import Document
-from hdrusd.legacy.scene import LegacyScene
 from hdrusd.report import Kind, Report
 
 _HEAD = 20  # two magic numbers, what the file holds, version, attributes
@@ -32,8 +31,8 @@ _FREE = 64 << 20
 _RATIO = 200
 
 
-def read(resolver: Resolver, report: Report) -> LegacyScene:
-    """Read ``resolver.source``. Raises InputError when nothing can be used."""
+def load(resolver: Resolver, report: Report) -> Document:
+    """The tree of ``resolver.source``. Raises InputError when nothing can be used."""
     source = resolver.source
     data = resolver.read()
     osgconv.check_head(data, ".osgb", source)
@@ -48,8 +47,8 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
             raise InputError(SourceRef(source, f"byte {problem.at}"), text) from problem
         place = SourceRef(source, f"byte {problem.at}")
         report.add(Kind.ASSUMED, "osgb-osgconv", place, "", f"{problem}; read by osgconv")
-        return osgconv.read(resolver, report)
-    return osg.read_document(document, resolver)
+        return osgconv.load(resolver, report)
+    return document
 
 
 class _Head:

@@ -18,10 +18,10 @@ import tempfile
 from pathlib import Path, PurePosixPath
 
 from hdrusd.errors import InputError, SourceRef
-from hdrusd.importers import osg, worker
+from hdrusd.importers import worker
 from hdrusd.importers.confine import landlock_version
 from hdrusd.importers.importer import Resolver
-from hdrusd.legacy.scene import LegacyScene
+from hdrusd.importers.osg_text import Document, parse
 from hdrusd.report import Kind, Report
 
 #: How a file begins, in either byte order.
@@ -40,8 +40,8 @@ _PICTURES = (
 )
 
 
-def read(resolver: Resolver, report: Report) -> LegacyScene:
-    """Read ``resolver.source``. Raises InputError when nothing can be used."""
+def load(resolver: Resolver, report: Report) -> Document:
+    """The tree of ``resolver.source``. Raises InputError when nothing can be used."""
     source = resolver.source
     suffix = source.suffix.lower()
     data = resolver.read()
@@ -63,7 +63,7 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
         converted = folder / "source.osgt"
         if converted.is_symlink() or not converted.is_file():
             raise InputError(source, "osgconv wrote nothing; want a file that it can read")
-        return osg.read_text(resolver.read(converted), resolver, report)
+        return parse(resolver.read(converted), source, report, resolver.limits)
 
 
 def check_head(data: bytes, suffix: str, source: Path) -> None:

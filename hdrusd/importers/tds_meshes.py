@@ -38,6 +38,8 @@ _IDENTITY = np.eye(4)
 
 Doubles = npt.NDArray[np.float64]
 _Words = npt.NDArray[np.uint16]
+#: An index of rows; one of all of them costs no copy.
+_Rows = slice | npt.NDArray[np.int64]
 
 
 @dataclass(slots=True)
@@ -188,16 +190,17 @@ class MeshMaker:
                 moved = points.astype(np.float64) @ matrix[:3, :3] + matrix[3, :3]
                 points = moved.astype(np.float32)
         keep = self._usable(raw, points)
-        if not len(keep):
+        faces = raw.faces[keep].astype(np.int64)
+        if not len(faces):
             text = f"no usable face among {len(raw.faces)}; the mesh is left out"
             self.document.note(Kind.INVALID, "3ds-no-faces", raw.chunk, raw.name, text)
             return None
-        used, corners = _used(raw.faces[keep], len(points))
-        points = np.ascontiguousarray(points[used], np.float32)
-        numbers = self._worn(raw, keep)
-        material, subsets = _subsets(numbers)
+        used, corners = _used(faces, len(points))
+        points = np.require(points[used], np.float32, ["C", "A", "W"])
+        material, subsets = _subsets(self._worn(raw, keep))
         uvs = self._texcoords(raw, used)
-        sided = {self.materials[number].two_sided for number in np.unique(numbers).tolist()}
+        worn = {subset.material for subset in subsets} if material is None else {material}
+        sided = {self.materials[number].two_sided for number in worn}
         if len(sided) > 1:
             text = "materials of one side and of two; all of the mesh shows both"
             self.document.note(Kind.REPLACED, "3ds-two-sided", raw.chunk, raw.name, text)
@@ -205,8 +208,8 @@ class MeshMaker:
             raw.name,
             self.document.ref(raw.chunk),
             points,
-            np.full(len(keep), 3, np.int32),
-            np.ascontiguousarray(corners.reshape(-1), np.int32),
+            np.full(len(corners), 3, np.int32),
+            corners.reshape(-1).astype(np.int32),
             normals=self._normals(raw, keep, points, corners),
             normals_interpolation="faceVarying",
             uvs={} if uvs is None else {"st": (uvs, "vertex")},
@@ -215,11 +218,11 @@ class MeshMaker:
             two_sided=True in sided,
         )
 
-    def _usable(self, raw: RawMesh, points: Floats) -> npt.NDArray[np.int64]:
-        """The numbers of the faces whose points are there and finite."""
+    def _usable(self, raw: RawMesh, points: Floats) -> _Rows:
+        """Which faces have points that are there and finite."""
         inside = len(raw.faces) > 0 and int(raw.faces.max()) < len(points)
         if inside and np.isfinite(points).all():
-            return np.arange(len(raw.faces))
+            return slice(None)
         there = np.asarray((raw.faces < len(points)).all(axis=1))
         finite = np.asarray(np.isfinite(points).all(axis=1))
         good = there.copy()
@@ -233,7 +236,7 @@ class MeshMaker:
                 self.document.note(Kind.INVALID, code, raw.chunk, raw.name, text)
         return np.flatnonzero(good)
 
-    def _worn(self, raw: RawMesh, keep: npt.NDArray[np.int64]) -> Ints:
+    def _worn(self, raw: RawMesh, keep: _Rows) -> Ints:
         """The number of each face's material in the scene."""
         worn = raw.worn[keep]
         bare = int(np.count_nonzero(worn == -1))
@@ -257,7 +260,7 @@ class MeshMaker:
             self.materials.append(material)
         return self._numbers[name]
 
-    def _texcoords(self, raw: RawMesh, used: npt.NDArray[np.int64]) -> Floats | None:
+    def _texcoords(self, raw: RawMesh, used: _Rows) -> Floats | None:
         values = raw.texcoords
         if values is None or not len(values):
             return None
@@ -265,9 +268,10 @@ class MeshMaker:
             text = f"texture coordinates of {len(values)} points; want {len(raw.points)}; left out"
             self.document.note(Kind.INVALID, "3ds-texcoords", raw.chunk, raw.name, text)
             return None
-        values = np.array(values[used], np.float32)
-        bad = ~np.isfinite(values).all(axis=1)
-        if bad.any():
+        values = np.require(values[: len(raw.points)][used], np.float32, ["C", "A", "W"])
+        finite = np.isfinite(values)
+        if not finite.all():
+            bad = ~finite.all(axis=1)
             text = f"texture coordinates of {int(bad.sum())} points are not finite; (0, 0) is used"
             self.document.note(Kind.INVALID, "3ds-texcoords", raw.chunk, raw.name, text)
             values[bad] = 0.0
@@ -276,7 +280,7 @@ class MeshMaker:
     def _normals(
         self,
         raw: RawMesh,
-        keep: npt.NDArray[np.int64],
+        keep: _Rows,
         points: Floats,
         corners: npt.NDArray[np.int64],
     ) -> Floats | None:
@@ -294,14 +298,13 @@ class MeshMaker:
         return smoothed(points, corners, groups)
 
 
-def _used(faces: _Words, count: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def _used(faces: npt.NDArray[np.int64], count: int) -> tuple[_Rows, npt.NDArray[np.int64]]:
     """The points in use, of ``count``, and the faces' corners as numbers among them."""
     flags = np.zeros(count, np.bool_)
-    flags[faces] = True
-    used = np.flatnonzero(flags)
-    if len(used) == count:
-        return used, faces.astype(np.int64)
-    return used, (np.cumsum(flags, dtype=np.int64) - 1)[faces]
+    flags[faces.reshape(-1)] = True
+    if flags.all():
+        return slice(None), faces
+    return np.flatnonzero(flags), (np.cumsum(flags, dtype=np.int64) - 1)[faces]
 
 
 def _subsets(numbers: Ints) -> tuple[int | None, tuple[Subset, ...]]:

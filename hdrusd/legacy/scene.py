@@ -13,7 +13,7 @@ translation is row 3. Texture coordinates have t = 0 at the BOTTOM of the image
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
 
@@ -23,6 +23,7 @@ import numpy.typing as npt
 from hdrusd.errors import SourceRef
 
 RGB = tuple[float, float, float]
+Four = tuple[float, float, float, float]
 Vec3 = tuple[float, float, float]
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int32]
@@ -70,7 +71,10 @@ class Texture:
     wrap_t: Wrap = "repeat"
     transform: UVTransform | None = None
     mode: str = "MODULATE"  # TexEnv mode; others become findings
-    channel: Literal["rgb", "r", "g", "b", "a"] = "rgb"  # for opacity: which channel is read
+    channel: Literal["rgb", "r", "g", "b", "a"] = "rgb"  # of maps of one number: which is read
+    # Of data: value = scale * texel + bias. A colour is multiplied by its factor instead.
+    scale: Four = (1.0, 1.0, 1.0, 1.0)
+    bias: Four = (0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,14 +96,53 @@ class Material:
     diffuse_map: Texture | None = None
     emission_map: Texture | None = None
     opacity_map: Texture | None = None
+    specular_map: Texture | None = None  # of a material with "glossiness"
+    # Data, whose texels are taken as they are; their values stand in place of the numbers in
+    # ``pbr``, so these maps but for normals and occlusion belong to a material that has it.
+    metallic_map: Texture | None = None
+    roughness_map: Texture | None = None
+    clearcoat_map: Texture | None = None
+    clearcoat_roughness_map: Texture | None = None
+    occlusion_map: Texture | None = None  # share of the ambient light that arrives
+    normal_map: Texture | None = None  # tangent space: x to where s grows, y to where t grows
     alpha_mode: Literal["opaque", "mask", "blend"] = "opaque"
     alpha_cutoff: float = 0.5
     two_sided: bool = False
     lit: bool = True  # False: GL_LIGHTING off, KHR_materials_unlit
     emission_cd_m2: bool = False  # emission is in cd/m2 already (glTF says so)
-    pbr: Mapping[str, float] | None = None  # "metallic", "roughness", ... as the source has them
+    # As the source has them: "metallic" or else "glossiness", which stands for a specular
+    # reflectance of its own; "roughness", "ior", "clearcoat", "clearcoat_roughness".
+    pbr: Mapping[str, float] | None = None
     defaults: frozenset[str] = frozenset()
     extras: Mapping[str, Any] = field(default_factory=dict)
+
+    def maps(self) -> dict[str, Texture]:
+        """Its textures by the names of their fields, in the order of the fields."""
+        found = {name: getattr(self, name) for name in MAPS}
+        return {name: texture for name, texture in found.items() if texture is not None}
+
+
+#: The fields of a material that hold a texture.
+MAPS = tuple(field.name for field in fields(Material) if field.name.endswith("_map"))
+
+#: Those whose texels are data: no colour, and no opacity, which belongs to its colour.
+DATA_MAPS = (
+    *("metallic_map", "roughness_map", "clearcoat_map", "clearcoat_roughness_map"),
+    *("occlusion_map", "normal_map"),
+)
+
+
+#: Of formats that do not say which way green points; half of all programs turn it over.
+GREEN_UP = "normal map: green is taken to point up in the picture, as in OpenGL and glTF"
+
+
+def normal_texels(strength: float = 1.0) -> tuple[Four, Four]:
+    """Scale and bias that make directions of the texels 0 to 1 of a normal map.
+
+    ``strength``: a factor on x and y.
+    """
+    s = float(strength)
+    return (2.0 * s, 2.0 * s, 2.0, 1.0), (-s, -s, -1.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +175,17 @@ class Mesh:
     # sum 1 (``legacy.skinning.influences`` makes them so). What k lacks is index 0, weight 0.
     joint_indices: Ints | None = None
     joint_weights: Floats | None = None
+
+    def face_materials(self) -> Ints:
+        """(f,) the material that each face wears; -1: none."""
+        worn = np.full(len(self.face_counts), -1 if self.material is None else self.material)
+        for subset in self.subsets:
+            worn[subset.faces] = subset.material
+        return worn.astype(np.int32)
+
+    def wears(self, material: int) -> npt.NDArray[np.bool_]:
+        """(f,) which faces wear a material."""
+        return np.asarray(self.face_materials() == material)
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,8 +327,7 @@ class LegacyScene:
         images = {
             texture.image.name
             for material in self.materials
-            for texture in (material.diffuse_map, material.emission_map, material.opacity_map)
-            if texture is not None
+            for texture in material.maps().values()
         }
         points = sum(light.lamps for light in self.lights if light.positions is not None)
         found = {

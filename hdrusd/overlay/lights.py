@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,7 @@ from hdrusd.usd.light_overs import (
 from hdrusd.usd.lux import input_source, normalized, photometric_file
 from hdrusd.usd.names import unique
 from hdrusd.usd.overs import Overs
+from hdrusd.usd.placed import level_share
 from hdrusd.usd.preset_sky import write_sky_dome, write_sky_sun
 from hdrusd.usd.source_stage import source_layer
 
@@ -75,7 +77,7 @@ class LightOverlay:
         self._done: set[str] = set()
         self._photometric = 0
 
-    def write(self, prim: Usd.Prim, places: list[Usd.Prim]) -> None:
+    def write(self, prim: Usd.Prim, places: Sequence[Usd.Prim]) -> None:
         """One light, once for every place in the layer."""
         place = str(self.overs.place(prim))
         if place in self._done:
@@ -86,7 +88,7 @@ class LightOverlay:
         if light_overs.is_photometric(prim):
             self._photometric += 1
             made = light.read_light(prim)
-            row = light_row(prim.GetName(), str(prim.GetPath()), made)
+            row = light_row(prim.GetName(), str(prim.GetPath()), made, level=_level(made, places))
             self.rows.append(row | {"lamps": sum(map(light_overs.copies, places))})
             return
         source = read_source_light(prim, places)
@@ -144,10 +146,11 @@ class LightOverlay:
             ambient.write_ambient(alone.OverridePrim(root.GetPath()), made.light, path)
         self.rows.append(light_row(path.name, str(path), made.light))
         if made.sun is not None:
-            path = self._free(root, "Sun")
+            path = self._free(root, made.body)
             sun = write_sky_sun(alone, path, made.sun, made.towards)
             UsdGeom.Xformable(sun).SetResetXformStack(True)
-            self.rows.append(light_row(path.name, str(path), made.sun))
+            level = max(made.towards[1], 0.0)
+            self.rows.append(light_row(path.name, str(path), made.sun, level=level))
 
     def _free(self, root: Usd.Prim, name: str) -> Sdf.Path:
         """A path below the default prim where the stage has nothing."""
@@ -293,7 +296,7 @@ class LightOverlay:
         source: SourceLight,
         made: PhotometricLight,
         file: LuminaireFile | None,
-        places: list[Usd.Prim],
+        places: Sequence[Usd.Prim],
     ) -> None:
         prim = source.prim
         flux = None if file is None else made.intensity * file.luminaire.flux()
@@ -303,7 +306,9 @@ class LightOverlay:
             replace(made, radius=source.radius) if source.radius > 0.0 else made,
             self._asked(source),
             place=str(SourceRef(self.file, str(prim.GetPath()))),
+            node=prim.GetParent().GetName(),
             file_flux=flux,
+            level=_level(made, places),
         )
         row["lamps"] = sum(map(light_overs.copies, places))
         if source.kind in _FLUX and not made.profile:
@@ -317,3 +322,8 @@ class LightOverlay:
 
     def _note(self, prim: Usd.Prim, kind: Kind, code: str, text: str) -> None:
         self.report.add(kind, code, SourceRef(self.file), str(prim.GetPath()), text)
+
+
+def _level(made: PhotometricLight, places: Sequence[Usd.Prim]) -> float:
+    """The share that a level ground gets of what comes from afar."""
+    return level_share(places) if made.kind == "distant" else 1.0

@@ -130,10 +130,12 @@ class MaterialOverlay:
         if not file:
             return None
         written = str(node.value("file", "").path)
-        if not self.resolver.allowed(Path(file.split("[")[0])):
-            there = Path(file.split("[")[0]).is_file()
-            text = "outside the declared roots; kept as it is. See --root" if there else "not found"
-            code = "file-refused" if there else "file-missing"
+        real = Path(file.split("[")[0])
+        if not self.resolver.allowed(real):
+            text, code = "not found", "file-missing"
+            if real.is_file():
+                text, code = "outside the declared roots; kept as it is; ", "file-refused"
+                text += f"--root {real.parent} would allow it"
             findings.finding(code, f"{written}: {text}", Kind.MISSING)
             return None
         if "[" in file:

@@ -31,9 +31,10 @@ from hdrusd.skies import SkyFiles
 from hdrusd.usd.authorship import authorship_inputs, write_authorship
 from hdrusd.usd.layer_files import new_layer, save_layer
 from hdrusd.usd.light_overs import light_places
+from hdrusd.usd.lux import is_light
 from hdrusd.usd.opening import usd_warnings
 from hdrusd.usd.overs import Overs, all_prims, population, relative
-from hdrusd.usd.placed import footprint
+from hdrusd.usd.placed import extents
 from hdrusd.usd.source_stage import (
     copy_stage_metadata,
     copy_time_metadata,
@@ -121,15 +122,16 @@ class Overlay:
             self._convert(None)
             self._convert_other_variants()
         if not any(counts.values()) and not self.layer.rootPrims:  # in no variant either
-            raise InputError(self.source, "nothing in it that a stage could show")
+            refused = (f.text for f in self.report if f.code == "file-refused")
+            text = next(refused, "nothing in it that a stage could show")
+            raise InputError(self.source, text)
         self.lights.write_sky()
         self.lights.note_kept()
         self.materials.note_kept()
-        self.sidecar.note_unmatched(self.report)
         materials, images = self.materials.account()
         self._save()
         self._validate()
-        return Result(
+        result = Result(
             self.output,
             self.report,
             counts=counts,
@@ -138,25 +140,31 @@ class Overlay:
             images=images,
             textures=self.maps.written | self.luminaires.written | self.skies.written,
             diagonal=self._diagonal(),
-            ground=footprint(self.stage),
+            ground=extents(self.stage)[1],
             unit_stated=self.unit_stated or self.options.source_unit is not None,
             source=self.source,
         )
+        result.note_unmatched(self.sidecar, self.options)
+        return result
 
     def _convert(self, brought: Brought | None) -> None:
         """Write over what is there now; ``brought``: only over what a variant brings."""
-        places = light_places(self.stage)
+        shared: dict[Sdf.Path, list[Usd.Prim]] = {}
         for prim in list(all_prims(self.stage)):
-            material, here = prim.IsA(UsdShade.Material), places.get(prim.GetPath())
+            material, light = prim.IsA(UsdShade.Material), is_light(prim)
             rule = self.sidecar.match("node", prim.GetName(), str(prim.GetPath()))
-            if not material and here is None and rule is None:
+            if not material and not light and rule is None:
                 continue
             if brought is not None and not brought.has(self.overs, prim):
                 continue
             if material:
                 self.materials.write(prim)
-            elif here is not None:
-                self.lights.write(prim, here)
+            elif light and not prim.IsInPrototype():
+                self.lights.write(prim, [prim])
+            elif light:
+                # A walk through all instances, which most variants bring no light into.
+                shared = shared or light_places(self.stage)
+                self.lights.write(prim, shared[prim.GetPath()])
             if rule is not None and "visible" in rule.values and prim.IsA(UsdGeom.Imageable):
                 token = "inherited" if rule.values["visible"] else "invisible"
                 self.overs.value(prim, "visibility", Sdf.ValueTypeNames.Token, token)

@@ -16,11 +16,13 @@ import math
 import re
 import unicodedata
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from hdrusd.photometry.lamp_words import LAMP_WORDS
 from hdrusd.units import LUMINANCE_WEIGHTS
 
 Array = npt.NDArray[Any]
@@ -65,13 +67,12 @@ def _class(name: str, low: float, high: float, citation: str, words: str) -> Sur
     return SurfaceClass(name, low, high, citation, phrases)
 
 
-#: Words of things that are no surface, and of stuffs of any colour: a street lamp is no street,
-#: and sand is a colour of cloth.
+#: Words of things that are no surface, besides lamps (a street lamp is no street), and of stuffs
+#: of any colour: sand is one of cloth.
 _THINGS = """
-    lamp lamps light lights bulb lantern led neon headlamp headlight taillight sign signs signal
-    signpost billboard screen sky skybox cloud clouds fire flame smoke logo decal car suv truck
-    bus van vehicle tank post pole leuchte lampe laterne licht schild ampel himmel feu
-    lampadaire panneau ciel nuage farola luz senal cielo nube segnale lampada
+    sign signs signal signpost billboard screen sky skybox cloud clouds fire flame smoke logo decal
+    car suv truck bus van vehicle tank post pole schild ampel himmel
+    panneau ciel nuage senal cielo nube segnale
     fabric cloth tissue textile leather plastic rubber velvet carpet curtain stoff leder
     kunststoff gummi tissu cuir plastique tela cuero plastico
 """
@@ -239,17 +240,28 @@ def words(name: str) -> list[str]:
 
 def surface_class(*names: str) -> SurfaceClass | None:
     """The class that the first telling name has: the material's, then its texture's."""
+    several, single, things = _vocabulary()
     for name in names:
         found = set(words(name))
         # Several words say more than one: car paint is no car.
-        for several in (True, False):
-            if not several and found & set(_THINGS.split()):
-                return None
-            for surface in CLASSES:
-                phrases = (p.split() for p in surface.words if (" " in p) == several)
-                if any(found.issuperset(phrase) for phrase in phrases):
-                    return surface
+        for surface, phrase in several:
+            if phrase <= found:
+                return surface
+        if found & things:
+            return None
+        ranks = [single[word] for word in found & single.keys()]
+        if ranks:
+            return CLASSES[min(ranks)]
     return None
+
+
+@cache
+def _vocabulary() -> tuple[list[tuple[SurfaceClass, set[str]]], dict[str, int], set[str]]:
+    """Phrases of several words with their classes; the first class of single words; things."""
+    phrases = [(rank, p.split()) for rank, c in enumerate(CLASSES) for p in c.words]
+    several = [(CLASSES[rank], set(phrase)) for rank, phrase in phrases if len(phrase) > 1]
+    single = {phrase[0]: rank for rank, phrase in reversed(phrases) if len(phrase) == 1}
+    return several, single, set(_THINGS.split()) | LAMP_WORDS
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
+import numpy.typing as npt
 
 from hdrusd.photometry.light import PhotometricLight
 
@@ -23,7 +25,7 @@ def flux(light: PhotometricLight) -> float | None:
     if outer >= math.pi:
         return 2.0 * math.pi * light.intensity * _up_to(math.pi, light.exponent)
     inner = outer * (1.0 - min(max(light.softness, 0.0), 1.0))
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    nodes, weights = _rule()
     middle = min(max(0.5 * math.pi, inner), outer)  # where |cos| has a corner
     fading = 0.0
     for low, high in ((inner, middle), (middle, outer)):
@@ -33,6 +35,12 @@ def flux(light: PhotometricLight) -> float | None:
         along = edge * np.abs(np.cos(angle)) ** light.exponent * np.sin(angle)
         fading += 0.5 * (high - low) * float(along @ weights)
     return 2.0 * math.pi * light.intensity * (_up_to(inner, light.exponent) + fading)
+
+
+@cache
+def _rule() -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Nodes between -1 and 1, and weights; each set is the roots of a matrix of that size."""
+    return np.polynomial.legendre.leggauss(_NODES)
 
 
 def _up_to(angle: float, exponent: float) -> float:

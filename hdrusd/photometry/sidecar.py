@@ -54,6 +54,7 @@ from pathlib import Path
 from typing import Any
 
 from hdrusd.errors import InputError, SourceRef
+from hdrusd.input_file import check_input
 from hdrusd.photometry.lamp_types import LAMP_TYPES, LampType
 from hdrusd.photometry.light import Provenance
 from hdrusd.photometry.recipe_keys import (
@@ -132,6 +133,19 @@ class Rule:
         return str(self.values.get("source", ""))
 
 
+@dataclass(frozen=True, slots=True)
+class Unmatched:
+    """A pattern that matched nothing in a source, and why."""
+
+    place: SourceRef
+    pattern: str
+    text: str
+
+    def note(self, report: Report) -> None:
+        """A finding of it."""
+        report.add(Kind.MISSING, "sidecar-no-match", self.place, self.pattern, self.text)
+
+
 @dataclass(slots=True)
 class Sidecar:
     """A photometry file, or an empty one."""
@@ -142,11 +156,17 @@ class Sidecar:
     light_unit: str = "nits"  # of a USD source: a name of photometry.light_unit.LIGHT_UNITS
     rules: list[Rule] = field(default_factory=list)
 
-    def match(self, section: str, *names: str) -> Rule | None:
-        """The first rule of a section whose pattern fits one of the names."""
+    def match(self, section: str, *names: str, path: str = "") -> Rule | None:
+        """The first rule of a section whose pattern fits one of the names.
+
+        Or the ``path``, where the pattern is of paths, that is begins with "/": what is above
+        a thing is not its name.
+        """
         first: Rule | None = None
         for rule in self.rules:
-            if rule.section != section or not rule.fits(names):
+            if rule.section != section:
+                continue
+            if not rule.fits((*names, path) if rule.pattern.startswith("/") else names):
                 continue
             if first is None:
                 rule.matched = True
@@ -155,27 +175,26 @@ class Sidecar:
                 rule.late = True
         return first
 
-    def note_unmatched(self, report: Report) -> None:
-        """A finding for each pattern that matched nothing."""
-        for rule in self.rules:
-            if not rule.matched:
-                report.add(
-                    Kind.MISSING,
-                    "sidecar-no-match",
-                    rule.place,
-                    rule.pattern,
-                    "what it fits is taken by a pattern before it; want the narrower one first"
-                    if rule.late
-                    else f"no {'node' if rule.section == 'lamp' else rule.section} of that name",
-                )
+    def unmatched(self) -> list[Unmatched]:
+        """The patterns that matched nothing."""
+        return [
+            Unmatched(
+                rule.place,
+                rule.pattern,
+                "what it fits is taken by a pattern before it; want the narrower one first"
+                if rule.late
+                else f"no {'node' if rule.section == 'lamp' else rule.section} of that name",
+            )
+            for rule in self.rules
+            if not rule.matched
+        ]
 
 
 def read_sidecar(path: Path, report: Report) -> Sidecar:
     """Read a photometry file. Raises InputError when it is no TOML at all."""
+    check_input(path)
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as problem:
-        raise InputError(path, f"cannot be read ({problem.strerror})") from problem
     except (ValueError, RecursionError) as problem:  # an integer of 5,000 digits is one too
         raise InputError(path, f"not TOML: {problem}") from problem
     sidecar = Sidecar(path)

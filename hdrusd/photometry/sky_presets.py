@@ -45,7 +45,10 @@ class PresetSky:
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """A sky by name. ``altitude``: of sun or moon where none is stated, and which it may have."""
+    """A sky by name. ``altitude``: of sun or moon where none is stated, and which it may have.
+
+    ``body``: which of them shines, "" where neither does.
+    """
 
     name: str
     text: str
@@ -54,6 +57,7 @@ class Preset:
     altitude: float | None = None  # degrees; None: it has none
     least: float = 0.0
     most: float = 90.0
+    body: str = ""
 
     def sky(
         self,
@@ -141,6 +145,7 @@ _ALL = (
         _moonlit,
         altitude=45.0,
         least=5.0,
+        body="Moon",
     ),
     Preset(
         "dusk",
@@ -165,6 +170,7 @@ _ALL = (
         _clear,
         altitude=45.0,
         least=5.0,
+        body="Sun",
     ),
 )
 

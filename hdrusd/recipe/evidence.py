@@ -10,22 +10,21 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from glob import escape
 from pathlib import Path
 
 import numpy as np
 
-from hdrusd.legacy.scene import Image, LegacyScene, Light, Material, Mesh
+from hdrusd.legacy.scene import LegacyScene, Light, Material
 from hdrusd.photometry.albedo import words
 from hdrusd.photometry.baked import baked_lamps
 from hdrusd.photometry.lamp_classes import BY_NAME, LampClass, lamp_class
+from hdrusd.photometry.lamp_words import LAMP_WORDS
+from hdrusd.recipe.glow import Picture, middle_of_glow
 from hdrusd.recipe.places import Doubles, Place, places
 from hdrusd.usd.transform import first_matrix
-
-#: A texture in linear values, (h, w, 3), None where it is missing.
-Picture = Callable[[Image], Doubles | None]
 
 #: m between a light point and the light that it may be the picture of; pairs that are tried.
 _SAME, _MOST_PAIRS = 0.5, 4_000_000
@@ -35,9 +34,6 @@ _DOWN, _WIDE, _HIGH = math.cos(math.radians(30.0)), 40.0, 3.0
 
 #: Words of the part of a lamp that glows; the rest of it is a post.
 _GLASS = {"glass", "bulb", "lens", "glow", "emissive", "lit", "light", "lights", "globe", "neon"}
-
-#: Words of lamps of any kind: English, German, French, Spanish.
-_LAMPS = {"lamp", "lamps", "light", "lights", "lantern", "lampe", "leuchte", "laterne", "lampara"}
 
 #: A headlamp shines level, within 15 degrees, from 0.5 to 1.5 m (UN Regulation 48, 6.2.4).
 _LEVEL, _BUMPER = math.sin(math.radians(15.0)), (0.5, 1.5)
@@ -77,7 +73,7 @@ def leads(scene: LegacyScene, picture: Picture) -> list[Lead]:
     found = _lights(scene, where, kinds)
     glowing = {index for index, m in enumerate(scene.materials) if any(m.emission)}
     wearers = _wearers(scene, where)
-    found += _materials(scene, wearers, glowing, kinds)
+    found += _materials(scene, wearers, glowing, kinds, picture)
     found += _names(scene, where, wearers, glowing)
     found += _spots(scene, picture, glowing)
     return sorted(found, key=lambda lead: not lead.certain)
@@ -225,6 +221,7 @@ def _materials(
     wearers: dict[int, list[Place]],
     glowing: set[int],
     kinds: dict[int, LampClass | None],
+    picture: Picture,
 ) -> list[Lead]:
     """What glows, by its names or by the light that it glows beside."""
     found = []
@@ -245,38 +242,21 @@ def _materials(
         lead.count, lead.strength = max(len(own), 1), value
         found.append(lead)
         if kind is not None and kind.key != "luminance" and beside is None:
-            found += [_unlit(scene, place, index, kind) for place in own if not _shines(place)]
+            dark = (place for place in own if not _shines(place))
+            found += [_unlit(scene, place, index, kind, picture) for place in dark]
     return _once(found)
 
 
-def _unlit(scene: LegacyScene, place: Place, material: int, kind: LampClass) -> Lead:
-    """A lamp for what glows and lights nothing, in the middle of its faces."""
-    corners = []
-    for index in place.node.meshes:
-        points = _worn_points(scene.meshes[index], material)
-        if len(points):
-            corners += [points.min(axis=0), points.max(axis=0)]
-    name = scene.materials[material].name
-    reason = f"{name} glows and no light is at it; what glows lights nothing"
+def _unlit(scene: LegacyScene, place: Place, index: int, kind: LampClass, picture: Picture) -> Lead:
+    """A lamp for what glows and lights nothing, in the middle of what glows."""
+    material = scene.materials[index]
+    reason = f"{material.name} glows and no light is at it; what glows lights nothing"
     lead = Lead("lamp", escape(place.node.name), "emission", reason, kind, False)
-    if corners:
-        middle = 0.5 * (np.min(corners, axis=0) + np.max(corners, axis=0))
+    meshes = [scene.meshes[mesh] for mesh in place.node.meshes]
+    middle = middle_of_glow(meshes, index, material, picture)
+    if middle is not None:
         lead.offset, lead.where = _rounded(middle), "the middle of what glows"
     return lead
-
-
-def _worn_points(mesh: Mesh, material: int) -> Doubles:
-    """Points of the faces that wear a material, (n, 3)."""
-    faces = np.zeros(len(mesh.face_counts), bool)
-    if mesh.material == material:
-        faces[:] = True
-        for subset in mesh.subsets:
-            faces[subset.faces] = False
-    for subset in mesh.subsets:
-        if subset.material == material:
-            faces[subset.faces] = True
-    corners = np.repeat(faces, mesh.face_counts)
-    return np.asarray(mesh.points[np.unique(mesh.face_indices[corners])], np.float64)
 
 
 def _rounded(point: Doubles) -> tuple[float, ...]:
@@ -310,7 +290,7 @@ def _names(
             continue
         own = _texts(material, [])
         named = _class(own)
-        telling = next((name for name in own if _LAMPS & set(words(name))), "")
+        telling = next((name for name in own if LAMP_WORDS & set(words(name))), "")
         if named is None and telling:
             reason = f"its name, {telling}"
             found.append(Lead("material", escape(material.name), "name", reason, None, False))

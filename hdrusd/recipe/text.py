@@ -11,6 +11,7 @@ from textwrap import wrap
 
 from hdrusd.errors import one_line
 from hdrusd.photometry.lamp_classes import LampClass
+from hdrusd.photometry.recipe_entry import quoted
 from hdrusd.recipe.evidence import Lead
 
 _WIDTH = 96
@@ -99,14 +100,3 @@ def _comment(text: str) -> str:
         flat = one_line(" ".join(paragraph.split()))
         lines += [f"# {line}" for line in wrap(flat, _WIDTH - 2, break_long_words=False)]
     return "\n".join(lines)
-
-
-def quoted(text: str) -> str:
-    """A basic string of TOML."""
-    escaped = {'"': '\\"', "\\": "\\\\"}
-    return '"' + "".join(escaped.get(c, c if c.isprintable() else _coded(c)) for c in text) + '"'
-
-
-def _coded(character: str) -> str:
-    code = ord(character)
-    return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"

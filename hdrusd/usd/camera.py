@@ -12,6 +12,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom
 from hdrusd.errors import InputError
 from hdrusd.legacy import scene as legacy
 from hdrusd.scene import Camera, Doubles
+from hdrusd.usd.specs import attribute
 
 #: Width of the film that we write, in tenths of a scene unit (36 mm in a metre stage: 0.36).
 _FILM_WIDTH = 36.0
@@ -28,28 +29,26 @@ Conform = Literal[
 ]
 
 
-def write_camera(
-    stage: Usd.Stage, path: Sdf.Path, camera: legacy.Camera, *, unit: float
-) -> UsdGeom.Camera:
-    """Define a UsdGeomCamera. ``unit``: scene units a source unit, for the clipping range.
+def write_camera(prim: Sdf.PrimSpec, camera: legacy.Camera, *, unit: float) -> None:
+    """What a UsdGeomCamera says. ``unit``: scene units a source unit, for the clipping range.
 
     Only the ratio of aperture and focal length means anything to a pinhole; the
     usual 36 mm film is written, so that a focal length reads as people expect.
     """
-    prim = UsdGeom.Camera.Define(stage, path)
+    types = Sdf.ValueTypeNames
     aspect = camera.aspect or 16.0 / 9.0
-    prim.CreateHorizontalApertureAttr(_FILM_WIDTH)
-    prim.CreateVerticalApertureAttr(_FILM_WIDTH / aspect)
+    width = _FILM_WIDTH
     if camera.kind == "orthographic":
-        prim.CreateProjectionAttr(UsdGeom.Tokens.orthographic)
-        # apertures are tenths of a scene unit
-        prim.CreateHorizontalApertureAttr(camera.height * aspect * unit * 10.0)
-        prim.CreateVerticalApertureAttr(camera.height * unit * 10.0)
+        attribute(prim, "projection", types.Token, "orthographic")
+        width = camera.height * aspect * unit * 10.0  # apertures are tenths of a scene unit
     else:
         half = math.tan(math.radians(camera.fov_y) / 2.0)
-        prim.CreateFocalLengthAttr(_FILM_WIDTH / aspect / 2.0 / half)
-    prim.CreateClippingRangeAttr(Gf.Vec2f(camera.near * unit, camera.far * unit))
-    return prim
+        attribute(prim, "focalLength", types.Float, _FILM_WIDTH / aspect / 2.0 / half)
+    height = camera.height * unit * 10.0 if camera.kind == "orthographic" else width / aspect
+    attribute(prim, "horizontalAperture", types.Float, width)
+    attribute(prim, "verticalAperture", types.Float, height)
+    clipping = Gf.Vec2f(camera.near * unit, camera.far * unit)
+    attribute(prim, "clippingRange", types.Float2, clipping)
 
 
 def read_camera(

@@ -240,11 +240,17 @@ class StageReader:
     def _lights(self, plan: _Plan, cache: UsdGeom.XformCache) -> Iterator[npt.NDArray[np.void]]:
         """The rows of every light that is not copied, and what of them is seen."""
         code = cache.GetTime()
-        for light in plan.lights:
-            row = self._light(light, cache)
-            if row is not None:
-                moving = light.varies or light.moves or light.hides
-                yield self._shown(light.prim, row, code, moving=moving)
+        found = [(light, self._light(light, cache)) for light in plan.lights]
+        lit = [(light, row) for light, row in found if row is not None]
+        # All at once: one by one it takes as long as reading them. What only moved is sound.
+        good = sound(joined([row for _, row in lit]))
+        for (light, row), fine in zip(lit, good.tolist(), strict=True):
+            if row is light.row and not fine:
+                self._note_unsound(light)
+                light.row = None
+                continue
+            moving = light.varies or light.moves or light.hides
+            yield self._shown(light.prim, row, code, moving=moving)
         for mesh in plan.meshes:
             if visible(mesh.prim, code):
                 rows = mesh.rows(cache)
@@ -274,6 +280,7 @@ class StageReader:
         return picture.tiles(rows)
 
     def _light(self, light: Light, cache: UsdGeom.XformCache) -> npt.NDArray[np.void] | None:
+        """The row of a light, if it shines at all; whether one just read is sound is not asked."""
         if light.hides and not visible(light.prim, cache.GetTime()):
             return None
         if light.row is None or light.varies or light.moves:
@@ -287,12 +294,15 @@ class StageReader:
             if row is not None:
                 self.profiles.assign(light.prim, row, cache.GetTime())
                 self.links.assign(light.prim, row)
-            if row is None or not sound(row).all():
-                text = "not finite, negative or too large; left out"
-                prim_finding(self.report, light.prim, Kind.INVALID, "light-invalid", text)
+            if row is None:
+                self._note_unsound(light)
                 return None
             light.row, light.place = row, matrix
         return light.row
+
+    def _note_unsound(self, light: Light) -> None:
+        text = "not finite, negative or too large; left out"
+        prim_finding(self.report, light.prim, Kind.INVALID, "light-invalid", text)
 
     def _instanced_lights(self, code: Usd.TimeCode) -> Iterator[npt.NDArray[np.void]]:
         for copies in self.instancers.copies(code):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -28,12 +29,16 @@ from hdrusd.photometry.fixture import (
     stopped,
 )
 from hdrusd.photometry.light import PhotometricLight
+from hdrusd.usd.boxes import Boxes
 from hdrusd.usd.triangles import corners
 
 Floats = npt.NDArray[np.float64]
 
 #: Triangles that are looked at for all lamps of a scene: some seconds.
 _MOST_TRIANGLES = 100_000_000
+
+#: Meshes whose triangles are kept: those of the places that follow one another.
+_KEPT = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +85,15 @@ def free_from(light: Usd.Prim, meshes: Iterable[PlacedMesh]) -> None:
         collection.ExcludePath(mesh.path)
 
 
+#: A mesh, its axes in the world and its origin from a lamp, the lamp's rays and radius.
+_Key = tuple[int, bytes, tuple[float, ...], int, float]
+
+
 class _Search:
-    """One search: mesh by mesh, so that the triangles of each are in the world once."""
+    """One search: mesh by mesh, so that the triangles of each are in the world once.
+
+    What stands about a lamp as it does about another, posts of one make, is looked at once.
+    """
 
     def __init__(
         self,
@@ -99,18 +111,23 @@ class _Search:
         self.lamps = lamps
         frames = np.array([self._world(lamp.prim.GetPath()) for lamp in lamps])
         self.positions: Floats = frames[:, 3, :3]
-        self.rays = [_rays(lamp.light, frame) for lamp, frame in zip(lamps, frames, strict=True)]
+        made: dict[tuple[object, ...], Rays] = {}
+        self.rays = [
+            _rays(lamp.light, frame, made) for lamp, frame in zip(lamps, frames, strict=True)
+        ]
         # Along one axis the lamps that may be near a mesh follow one another.
         self.axis = int(np.argmax(np.ptp(self.positions, axis=0)))
         self.order = np.argsort(self.positions[:, self.axis])
         self.sorted: Floats = self.positions[self.order, self.axis]
         self.small: list[list[tuple[PlacedMesh, Stopped]]] = [[] for _ in lamps]
         self.large: list[list[tuple[PlacedMesh, Stopped]]] = [[] for _ in lamps]
+        self.known: dict[_Key, tuple[bool, Stopped | None]] = {}
         self.left = _MOST_TRIANGLES
 
     def run(self, placed: Sequence[PlacedMesh]) -> None:
         boxes = [_box(mesh) for mesh in self.scene.meshes]
         opaque = _opaque_materials(self.scene)
+        meshes = lru_cache(_KEPT)(lambda number: _triangles(self.scene.meshes[number], opaque))
         for each in placed:
             box = boxes[each.mesh]
             if box is None:
@@ -123,15 +140,9 @@ class _Search:
             ]
             if not near or not self._shown(each.node):
                 continue
-            triangles = _triangles(self.scene.meshes[each.mesh], opaque)
-            if len(triangles) == 0:
-                continue
-            if self.left < len(triangles) * len(near):
-                for number in near:
-                    self.lamps[number].looked_at = False
-                continue
-            self.left -= len(triangles) * len(near)
-            self._look(each, triangles @ world[:3, :3] + world[3, :3], near)
+            triangles = meshes(each.mesh)
+            if len(triangles):
+                self._look(each, triangles, world, near)
         for lamp, rays, small, large in zip(
             self.lamps, self.rays, self.small, self.large, strict=True
         ):
@@ -139,21 +150,57 @@ class _Search:
             held = [mesh for mesh, it in large if it.holds(rays.weight, ALONE)]
             lamp.too_large = held[0] if held else None
 
-    def _look(self, mesh: PlacedMesh, triangles: Floats, near: Sequence[int]) -> None:
-        """What a mesh stops of the lamps that are near its box."""
+    def _look(
+        self, mesh: PlacedMesh, triangles: Floats, world: Floats, near: Sequence[int]
+    ) -> None:
+        """What a mesh stops of the lamps that are near its box. ``triangles``: in its space."""
+        keys = {number: self._key(mesh.mesh, world, number) for number in near}
+        new = list({key: number for number, key in keys.items() if key not in self.known}.items())
+        if new:
+            if self.left < len(triangles):
+                for number in near:
+                    self.lamps[number].looked_at = False
+                return
+            self.left -= len(triangles)
+            self._stop(triangles @ world[:3, :3] + world[3, :3], new)
+        for number, key in keys.items():
+            if key not in self.known:
+                self.lamps[number].looked_at = False
+                continue
+            small, it = self.known[key]
+            if it is not None:
+                (self.small if small else self.large)[number].append((mesh, it))
+
+    def _key(self, mesh: int, world: Floats, number: int) -> _Key:
+        """Where a mesh stands about a lamp, to a micrometre."""
+        axes = (np.round(world[:3, :3], 12) + 0.0).tobytes()
+        way = np.round(world[3, :3] - self.positions[number], 6) + 0.0
+        return (
+            mesh,
+            axes,
+            tuple(way.tolist()),
+            id(self.rays[number]),
+            self.lamps[number].light.radius,
+        )
+
+    def _stop(self, triangles: Floats, new: Sequence[tuple[_Key, int]]) -> None:
+        """Find what triangles, in the world, stop of lamps."""
         low, high = triangles.min(axis=1), triangles.max(axis=1)
         size = float(np.linalg.norm(high.max(axis=0) - low.min(axis=0)))
         small = size <= LONGEST and area(triangles) <= LARGEST_AREA
-        for number in near:
+        boxes = Boxes(low, high)
+        for key, number in new:
             place, light = self.positions[number], self.lamps[number].light
-            beside = np.all((low <= place + NEAR) & (high >= place - NEAR), axis=1)
-            if not beside.any():
-                continue
+            beside = boxes.meeting(place - NEAR, place + NEAR)
             # Of a small mesh all stops the lamp; what is large may only lie close about it.
             about = triangles if small else triangles[beside]
-            it = stopped(about - place, self.rays[number], light.radius)
-            if it.near.any():
-                (self.small if small else self.large)[number].append((mesh, it))
+            if self.left < len(about):
+                continue
+            it = None
+            if len(beside):
+                self.left -= len(about)
+                it = stopped(about - place, self.rays[number], light.radius)
+            self.known[key] = small, it if it is not None and it.near.any() else None
 
     def _near(self, low: Floats, high: Floats) -> npt.NDArray[np.intp]:
         """The numbers of the lamps in a box that is grown by ``NEAR``."""
@@ -177,10 +224,15 @@ class _Search:
         return world
 
 
-def _rays(light: PhotometricLight, frame: Floats) -> Rays:
+def _rays(light: PhotometricLight, frame: Floats, made: dict[tuple[object, ...], Rays]) -> Rays:
+    """The rays of a lamp; of lamps that shine alike the same ones, kept in ``made``."""
     axis = -frame[2, :3]
     length = float(np.linalg.norm(axis))
-    return lamp_rays(light, axis / length if length > 0.0 else np.array([0.0, 0.0, -1.0]))
+    axis = axis / length if length > 0.0 else np.array([0.0, 0.0, -1.0])
+    key = axis.tobytes(), light.cutoff, light.exponent, bool(light.profile)
+    if key not in made:
+        made[key] = lamp_rays(light, axis)
+    return made[key]
 
 
 def _box(mesh: Mesh) -> Floats | None:
@@ -204,10 +256,7 @@ def _opaque_materials(scene: LegacyScene) -> npt.NDArray[np.bool_]:
 
 def _triangles(mesh: Mesh, opaque: npt.NDArray[np.bool_]) -> Floats:
     """(t, 3, 3) the opaque triangles of a mesh in its own space, those with an extent."""
-    wear = np.full(len(mesh.face_counts), -1 if mesh.material is None else mesh.material)
-    for subset in mesh.subsets:
-        wear[subset.faces] = subset.material
     made = corners(mesh.face_counts, mesh.face_indices, left_handed=mesh.left_handed)
-    made = made.where(opaque[wear][made.face])
+    made = made.where(opaque[mesh.face_materials()][made.face])
     triangles: Floats = mesh.points[made.vertex].astype(np.float64)
     return triangles[np.isfinite(triangles).all(axis=(1, 2))]

@@ -19,6 +19,7 @@ from hdrusd.photometry.light import PhotometricLight
 from hdrusd.report import Kind, Report
 from hdrusd.scene import light_rows
 from hdrusd.units import LUMINANCE_WEIGHTS, distant_luminance, dome_luminance, sphere_luminance
+from hdrusd.usd import specs
 from hdrusd.usd.area import shape_row
 from hdrusd.usd.findings import prim_finding
 from hdrusd.usd.light_controls import SP_RATIO, light_key, read_controls, scotopic_ratio
@@ -34,6 +35,8 @@ API = "HdrusdPhotometricLightAPI"
 INTENSITY = "inputs:photometric:luminousIntensity"
 ILLUMINANCE = "inputs:photometric:illuminance"
 
+_TYPES = Sdf.ValueTypeNames
+
 
 def write_light(
     stage: Usd.Stage, path: Sdf.Path, light: PhotometricLight, *, scale: float = 1.0
@@ -43,59 +46,62 @@ def write_light(
     ``scale``: metres that one unit of the light's own space measures in the world,
     so that the radius written is the lamp's.
     """
-    color = Gf.Vec3f(*light.chromaticity)
-    prim: Usd.Prim
+    with Sdf.ChangeBlock():
+        write_light_spec(specs.define_on(stage, path, light_type(light)), light, scale=scale)
+    return stage.GetPrimAtPath(path)
+
+
+def light_type(light: PhotometricLight) -> str:
+    """The UsdLux type that a light becomes."""
+    return {"distant": "DistantLight", "ambient": "DomeLight"}.get(light.kind, "SphereLight")
+
+
+def write_light_spec(prim: Sdf.PrimSpec, light: PhotometricLight, *, scale: float = 1.0) -> None:
+    """What ``write_light`` says, in a prim of the light's type that says nothing yet."""
     if light.kind == "distant":
-        distant = UsdLux.DistantLight.Define(stage, path)
-        distant.CreateAngleAttr(DISTANT_ANGLE)
-        distant.CreateIntensityAttr(distant_luminance(light.intensity, DISTANT_ANGLE))
-        prim = distant.GetPrim()
+        _input(prim, "angle", _TYPES.Float, DISTANT_ANGLE)
+        nits = distant_luminance(light.intensity, DISTANT_ANGLE)
     elif light.kind == "ambient":
-        dome = UsdLux.DomeLight.Define(stage, path)
-        dome.CreateIntensityAttr(dome_luminance(light.intensity))
-        prim = dome.GetPrim()
+        nits = dome_luminance(light.intensity)
     else:
-        sphere = UsdLux.SphereLight.Define(stage, path)
-        sphere.CreateRadiusAttr(light.radius / scale)
-        sphere.CreateTreatAsPointAttr(True)
-        sphere.CreateIntensityAttr(sphere_luminance(light.intensity, light.radius))
-        prim = sphere.GetPrim()
+        _input(prim, "radius", _TYPES.Float, light.radius / scale)
+        specs.attribute(prim, "treatAsPoint", _TYPES.Bool, True)
+        nits = sphere_luminance(light.intensity, light.radius)
         _write_shaping(prim, light)
-    api = UsdLux.LightAPI(prim)
-    api.CreateColorAttr(color)
-    api.CreateNormalizeAttr(False)
+    _input(prim, "intensity", _TYPES.Float, nits)
+    _input(prim, "color", _TYPES.Color3f, Gf.Vec3f(*light.chromaticity))
+    _input(prim, "normalize", _TYPES.Bool, False)
     write_origin(prim, light)
     if not light.profile:
         name = INTENSITY if light.kind in ("point", "spot") else ILLUMINANCE
-        prim.CreateAttribute(name, Sdf.ValueTypeNames.Float, False).Set(light.intensity)
+        specs.attribute(prim, name, _TYPES.Float, light.intensity)
     if light.sp:
-        prim.CreateAttribute(f"inputs:{SP_RATIO}", Sdf.ValueTypeNames.Float, False).Set(light.sp)
-    return prim
+        _input(prim, SP_RATIO, _TYPES.Float, light.sp)
 
 
-def write_origin(prim: Usd.Prim, light: PhotometricLight) -> None:
+def write_origin(prim: Sdf.PrimSpec, light: PhotometricLight) -> None:
     """Apply our schema and say where the light's numbers come from."""
-    prim.ApplyAPI(API)
-    _uniform(prim, "photometric:provenance", Sdf.ValueTypeNames.Token, light.provenance)
+    specs.apply(prim, API)
+    _uniform(prim, "photometric:provenance", _TYPES.Token, light.provenance)
     if light.rule:
-        _uniform(prim, "photometric:rule", Sdf.ValueTypeNames.String, light.rule)
+        _uniform(prim, "photometric:rule", _TYPES.String, light.rule)
     if light.source:
-        _uniform(prim, "photometric:source", Sdf.ValueTypeNames.String, light.source)
+        _uniform(prim, "photometric:source", _TYPES.String, light.source)
     trust = confidence(light.provenance, light.rule, light.source)
-    _uniform(prim, "photometric:confidence", Sdf.ValueTypeNames.Token, trust)
+    _uniform(prim, "photometric:confidence", _TYPES.Token, trust)
 
 
 def write_legacy_falloff(
-    prim: Usd.Prim,
+    prim: Sdf.PrimSpec,
     reach: float | None,
     attenuation: tuple[float, float, float] | None,
 ) -> None:
     """Keep a legacy range (m) and attenuation as metadata; light has neither."""
     if reach is not None:
-        _uniform(prim, "photometric:legacy:range", Sdf.ValueTypeNames.Float, reach)
+        _uniform(prim, "photometric:legacy:range", _TYPES.Float, reach)
     if attenuation is not None:
         value = Gf.Vec3f(*attenuation)
-        _uniform(prim, "photometric:legacy:attenuation", Sdf.ValueTypeNames.Float3, value)
+        _uniform(prim, "photometric:legacy:attenuation", _TYPES.Float3, value)
 
 
 def read_light(prim: Usd.Prim, *, scale: float = 1.0) -> PhotometricLight:
@@ -229,15 +235,15 @@ def _note_unused(prim: Usd.Prim, time: Usd.TimeCode, report: Report) -> None:
         prim_finding(report, prim, Kind.DROPPED, "light-linking", "a dome lights everything")
 
 
-def _write_shaping(prim: Usd.Prim, light: PhotometricLight) -> None:
+def _write_shaping(prim: Sdf.PrimSpec, light: PhotometricLight) -> None:
     if light.cutoff >= 180.0 and light.exponent == 0.0 and not light.profile:
         return
-    shaping = UsdLux.ShapingAPI.Apply(prim)
+    specs.apply(prim, "ShapingAPI")
     if light.profile:
-        shaping.CreateShapingIesFileAttr(Sdf.AssetPath(light.profile))
-    shaping.CreateShapingConeAngleAttr(light.cutoff)
-    shaping.CreateShapingConeSoftnessAttr(light.softness)
-    shaping.CreateShapingFocusAttr(light.exponent)
+        _input(prim, "shaping:ies:file", _TYPES.Asset, Sdf.AssetPath(light.profile))
+    _input(prim, "shaping:cone:angle", _TYPES.Float, light.cutoff)
+    _input(prim, "shaping:cone:softness", _TYPES.Float, light.softness)
+    _input(prim, "shaping:focus", _TYPES.Float, light.exponent)
 
 
 def _read_shaping(
@@ -267,5 +273,9 @@ def _scaled(scale: float) -> Gf.Matrix4d:
     return Gf.Matrix4d().SetScale(scale)
 
 
-def _uniform(prim: Usd.Prim, name: str, kind: Sdf.ValueTypeName, value: object) -> None:
-    prim.CreateAttribute(name, kind, False, Sdf.VariabilityUniform).Set(value)
+def _input(prim: Sdf.PrimSpec, name: str, kind: Sdf.ValueTypeName, value: object) -> None:
+    specs.attribute(prim, f"inputs:{name}", kind, value)
+
+
+def _uniform(prim: Sdf.PrimSpec, name: str, kind: Sdf.ValueTypeName, value: object) -> None:
+    specs.attribute(prim, name, kind, value, uniform=True)

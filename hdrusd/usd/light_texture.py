@@ -74,7 +74,7 @@ class LightTextures:
             try:
                 data = asset_bytes(path)
                 if data is None:
-                    raise InputError(Path(path), "no such image")
+                    raise InputError(Path(path), "no such file")
                 self._known[path] = picture(path, read_image(Path(path), data), self.gamma)
             except (InputError, OSError) as problem:
                 self._known[path] = None

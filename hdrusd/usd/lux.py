@@ -83,13 +83,13 @@ def connection_end(attribute: Usd.Attribute) -> Usd.Attribute:
     a circle or after more than 32 steps. UsdShade's own search recurses, and a long
     enough chain in a file overflows its stack.
     """
-    stage, end = attribute.GetStage(), attribute
+    end = attribute
     for _ in range(_MAX_CONNECTIONS):
         targets = end.GetConnections()
         if not targets:
             return end
         # Several sources are for arrays of lights and shaders; the first one is the value.
-        end = stage.GetAttributeAtPath(targets[0])
+        end = attribute.GetStage().GetAttributeAtPath(targets[0])
         if not end:
             break
     return attribute
@@ -105,6 +105,8 @@ def input_source(prim: Usd.Prim, name: str) -> Usd.Attribute:
     if not own:
         return own
     end = connection_end(own)
+    if end is own:
+        return own
     return end if UsdShade.Input.IsInput(end) and end.HasValue() else own
 
 

@@ -9,16 +9,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
+from pxr import Gf, Sdf, Usd, UsdShade
 
-from hdrusd.legacy.scene import RGB, Material, Texture, UVTransform
+from hdrusd.legacy.scene import RGB, Four, Material, Texture, UVTransform
 from hdrusd.photometry.confidence import confidence
 from hdrusd.usd.preview import roughness_from_shininess
 
 _API = "HdrusdPhotometricMaterialAPI"
+
+_NONE: Four = (0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +47,9 @@ class Surface:
     emission_map: Map | None = None
     replaces_reflection: bool = False
     opacity_map: Map | None = None
+    specular_map: Map | None = None
+    #: "normal", "occlusion", "metallic", "roughness", "clearcoat", "clearcoat_roughness".
+    data_maps: Mapping[str, Map] = field(default_factory=dict)
     vertex_color: str = ""
     provenance: str = ""
     rule: str = ""
@@ -54,7 +59,7 @@ class Surface:
 def write_look(
     stage: Usd.Stage, path: Sdf.Path, material: Material, maps: dict[str, Map], vertex_color: str
 ) -> None:
-    """The legacy look as UsdPreviewSurface; ``maps`` by "diffuse", "emission", "opacity".
+    """The legacy look as UsdPreviewSurface; ``maps`` by "diffuse", "normal": as the fields.
 
     A picture without a map is missing, refused or broken: the reference stays in the extras.
     """
@@ -63,18 +68,13 @@ def write_look(
     network.color("emissiveColor", _shown(material), maps.get("emission"), "")
     prim = network.material.GetPrim()
     display_name(prim, material.name)
-    textures = {
-        "diffuse": material.diffuse_map,
-        "emission": material.emission_map,
-        "opacity": material.opacity_map,
-    }
     lost = {
-        f"{role}_map": texture.image.name
-        for role, texture in textures.items()
-        if texture is not None and role not in maps
+        name: texture.image.name
+        for name, texture in material.maps().items()
+        if name.removesuffix("_map") not in maps
     }
     keep_extras(prim, {**material.extras, **lost})
-    _write_common(network, material, material.specular, maps.get("opacity"))
+    _write_common(network, material, material.specular, maps)
 
 
 def write_photometric(
@@ -89,8 +89,11 @@ def write_photometric(
         network.color("diffuseColor", surface.diffuse, surface.diffuse_map, surface.vertex_color)
     network.color("emissiveColor", surface.emission, surface.emission_map, "")
     specular = black if surface.replaces_reflection else surface.specular
-    dark = surface.replaces_reflection
-    _write_common(network, material, specular, surface.opacity_map, dark=dark)
+    maps = {} if surface.replaces_reflection else dict(surface.data_maps)
+    for role, used in (("opacity", surface.opacity_map), ("specular", surface.specular_map)):
+        if used is not None:
+            maps[role] = used
+    _write_common(network, material, specular, maps, dark=surface.replaces_reflection)
     prim = network.material.GetPrim()
     prim.ApplyAPI(_API)
     types = Sdf.ValueTypeNames
@@ -131,25 +134,40 @@ def _shown(material: Material) -> RGB:
 
 
 def _write_common(
-    network: _Network, material: Material, specular: RGB, opacity: Map | None, *, dark: bool = False
+    network: _Network,
+    material: Material,
+    specular: RGB,
+    maps: Mapping[str, Map],
+    *,
+    dark: bool = False,
 ) -> None:
-    """Gloss and opacity, which both surfaces share; a dark one reflects nothing at all."""
+    """Gloss, opacity and data, which both surfaces share; a dark one reflects nothing at all."""
     pbr = material.pbr or {}
     roughness = pbr.get("roughness", roughness_from_shininess(material.shininess))
     if "glossiness" in pbr:
         roughness = 1.0 - pbr["glossiness"]
     if dark or material.pbr is None or "glossiness" in pbr:
         network.number("useSpecularWorkflow", 1, Sdf.ValueTypeNames.Int)
-        network.color("specularColor", specular, None, "")
+        network.color("specularColor", specular, maps.get("specular"), "")
     else:
-        network.number("metallic", pbr.get("metallic", 0.0))
-    network.number("roughness", roughness)
+        network.data("metallic", pbr.get("metallic", 0.0), maps.get("metallic"))
+        if "ior" in pbr:
+            network.number("ior", pbr["ior"])
+    network.data("roughness", roughness, maps.get("roughness"))
+    if "clearcoat" in pbr and not dark:
+        network.data("clearcoat", pbr["clearcoat"], maps.get("clearcoat"))
+        sharp = pbr.get("clearcoat_roughness", 0.0)
+        network.data("clearcoatRoughness", sharp, maps.get("clearcoat_roughness"))
+    if "occlusion" in maps:
+        network.data("occlusion", 1.0, maps["occlusion"])
+    if "normal" in maps:
+        network.normal(maps["normal"])
     if material.alpha_mode == "opaque" or (
         material.alpha_mode == "mask" and material.alpha_cutoff <= 0.0  # which nothing is below
     ):
         return
-    if opacity is not None:
-        network.scalar("opacity", opacity, material.alpha)
+    if "opacity" in maps:
+        network.scalar("opacity", maps["opacity"], material.alpha)
     else:
         network.number("opacity", material.alpha)
     if material.alpha_mode == "mask":
@@ -174,7 +192,7 @@ class _Network:
         port = self.surface.CreateInput(name, Sdf.ValueTypeNames.Color3f)
         port.Set(Gf.Vec3f(*value))
         if used is not None:
-            port.ConnectToSource(self._texture(name, used), "rgb")
+            port.ConnectToSource(self._texture(name, used, (*used.scale, 1.0)), "rgb")
         elif primvar:
             reader = self._node(f"{name}_primvar", "UsdPrimvarReader_float3")
             reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set(primvar)
@@ -192,21 +210,38 @@ class _Network:
 
     def scalar(self, name: str, used: Map, factor: float) -> None:
         """One channel of a texture, times ``factor``."""
-        port = self.surface.CreateInput(name, Sdf.ValueTypeNames.Float)
-        scaled = Map(used.file, used.texture, used.raw, (factor, factor, factor))
-        channel = "r" if used.texture.channel == "rgb" else used.texture.channel
-        node = self._texture(name, scaled, alpha=factor)
-        port.ConnectToSource(node, channel)
+        self._channel(name, used, (factor,) * 4)
 
-    def _texture(self, name: str, used: Map, alpha: float = 1.0) -> UsdShade.ConnectableAPI:
+    def data(self, name: str, value: float, used: Map | None) -> None:
+        """A number, or one channel of a texture by its own scale and bias in its place."""
+        self.number(name, value)
+        if used is not None:
+            self._channel(name, used, used.texture.scale, used.texture.bias)
+
+    def normal(self, used: Map) -> None:
+        """A normal map in tangent space."""
+        port = self.surface.CreateInput("normal", Sdf.ValueTypeNames.Normal3f)
+        node = self._texture("normal", used, used.texture.scale, used.texture.bias)
+        port.ConnectToSource(node, "rgb")
+
+    def _channel(self, name: str, used: Map, scale: Four, bias: Four = _NONE) -> None:
+        port = self.surface.CreateInput(name, Sdf.ValueTypeNames.Float)
+        channel = "r" if used.texture.channel == "rgb" else used.texture.channel
+        port.ConnectToSource(self._texture(name, used, scale, bias), channel)
+
+    def _texture(
+        self, name: str, used: Map, scale: Four, bias: Four = _NONE
+    ) -> UsdShade.ConnectableAPI:
         node = self._node(f"{name}_texture", "UsdUVTexture")
         types, texture = Sdf.ValueTypeNames, used.texture
         node.CreateInput("file", types.Asset).Set(Sdf.AssetPath(used.file))
         node.CreateInput("sourceColorSpace", types.Token).Set("raw" if used.raw else "sRGB")
         node.CreateInput("wrapS", types.Token).Set(texture.wrap_s)
         node.CreateInput("wrapT", types.Token).Set(texture.wrap_t)
-        if used.scale != (1.0, 1.0, 1.0) or alpha != 1.0:
-            node.CreateInput("scale", types.Float4).Set(Gf.Vec4f(*used.scale, alpha))
+        if scale != (1.0, 1.0, 1.0, 1.0):
+            node.CreateInput("scale", types.Float4).Set(Gf.Vec4f(*scale))
+        if bias != _NONE:
+            node.CreateInput("bias", types.Float4).Set(Gf.Vec4f(*bias))
         reader = self._node(f"{name}_st", "UsdPrimvarReader_float2")
         reader.CreateInput("varname", types.String).Set(texture.uv_set)
         reader.CreateOutput("result", types.Float2)
@@ -256,8 +291,3 @@ def bind(prim: Usd.Prim, material: Sdf.Path) -> None:
     """Bind a material by path; its prim may stand in another layer."""
     UsdShade.MaterialBindingAPI.Apply(prim).GetDirectBindingRel().SetTargets([material])
 
-
-def bind_faces(mesh: UsdGeom.Mesh, name: str, faces: object, material: Sdf.Path) -> None:
-    """Bind a material to some faces of a mesh."""
-    subset = UsdGeom.Subset.CreateGeomSubset(mesh, name, UsdGeom.Tokens.face, faces, "materialBind")
-    bind(subset.GetPrim(), material)

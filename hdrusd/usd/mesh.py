@@ -13,6 +13,7 @@ from hdrusd.report import Kind
 from hdrusd.usd.arrays import integers, rows
 from hdrusd.usd.cage import Polygons, refined_cage
 from hdrusd.usd.skel import Skin
+from hdrusd.usd.specs import attribute, primvar
 from hdrusd.usd.subdivision import Refined
 from hdrusd.usd.surface import Note, Surface
 from hdrusd.usd.triangles import Corners, corners, face_normals, smooth_normals
@@ -23,36 +24,37 @@ Floats = npt.NDArray[np.float32]
 COLOR_PRIMVAR = "displayColor"
 
 
-def write_mesh(stage: Usd.Stage, path: Sdf.Path, mesh: Mesh) -> Usd.Prim:
-    """Define a UsdGeomMesh (subdivisionScheme none) with its primvars; no material, no transform.
+def write_mesh(prim: Sdf.PrimSpec, mesh: Mesh) -> None:
+    """What a UsdGeomMesh says (subdivisionScheme none), its primvars; no material, no transform.
 
     Legacy units are kept: the root's transform scales them.
     """
-    prim = UsdGeom.Mesh.Define(stage, path)
-    prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(mesh.points))
-    prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(mesh.face_counts))
-    prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.face_indices))
+    types = Sdf.ValueTypeNames
+    attribute(prim, "subdivisionScheme", types.Token, "none", uniform=True)
+    attribute(prim, "points", types.Point3fArray, Vt.Vec3fArray.FromNumpy(mesh.points))
+    counts, indices = map(Vt.IntArray.FromNumpy, (mesh.face_counts, mesh.face_indices))
+    attribute(prim, "faceVertexCounts", types.IntArray, counts)
+    attribute(prim, "faceVertexIndices", types.IntArray, indices)
     if len(mesh.points):
-        low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-        prim.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([low, high])))
-    prim.CreateDoubleSidedAttr(mesh.two_sided)  # False too: it asks renderers to cull
+        box = np.stack([mesh.points.min(axis=0), mesh.points.max(axis=0)])
+        attribute(prim, "extent", types.Float3Array, Vt.Vec3fArray.FromNumpy(box))
+    # False too: it asks renderers to cull.
+    attribute(prim, "doubleSided", types.Bool, mesh.two_sided, uniform=True)
     if mesh.left_handed:
-        prim.CreateOrientationAttr(UsdGeom.Tokens.leftHanded)
-    primvars = UsdGeom.PrimvarsAPI(prim)
+        attribute(prim, "orientation", types.Token, "leftHanded", uniform=True)
     if mesh.normals is not None:
-        prim.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(mesh.normals)))
-        prim.SetNormalsInterpolation(mesh.normals_interpolation)
+        normals = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(mesh.normals))
+        primvar(prim, "normals", types.Normal3fArray, normals, mesh.normals_interpolation)
     for name, (values, interpolation) in mesh.uvs.items():
-        uv = primvars.CreatePrimvar(name, Sdf.ValueTypeNames.TexCoord2fArray, interpolation)
-        uv.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(values)))
+        uv = Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(values))
+        primvar(prim, f"primvars:{name}", types.TexCoord2fArray, uv, interpolation)
     if mesh.colors is not None:
-        color = prim.CreateDisplayColorPrimvar(mesh.colors_interpolation)
-        color.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(mesh.colors[:, :3])))
+        color = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(mesh.colors[:, :3]))
+        way = mesh.colors_interpolation
+        primvar(prim, f"primvars:{COLOR_PRIMVAR}", types.Color3fArray, color, way)
         if float(mesh.colors[:, 3].min(initial=1.0)) < 1.0:
-            opacity = prim.CreateDisplayOpacityPrimvar(mesh.colors_interpolation)
-            opacity.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(mesh.colors[:, 3])))
-    return prim.GetPrim()
+            opacity = Vt.FloatArray.FromNumpy(np.ascontiguousarray(mesh.colors[:, 3]))
+            primvar(prim, "primvars:displayOpacity", types.FloatArray, opacity, way)
 
 
 def topology_varies(prim: Usd.Prim) -> bool:

@@ -10,6 +10,7 @@ from pathlib import Path
 from pxr import Sdf, Tf, Usd, UsdUtils
 
 from hdrusd.errors import InputError, SourceRef
+from hdrusd.input_file import check_input
 from hdrusd.report import Kind, Report
 from hdrusd.usd.variants import select_variants
 
@@ -27,7 +28,7 @@ def open_stage(
     otherwise goes to standard error. Raises InputError.
     """
     paths = [_mask_path(path, name) for name in mask]
-    root, over = _layer(path), None if session is None else _layer(session)
+    root, over = open_layer(path), None if session is None else open_layer(session)
     if variants:  # over the user's session layer, which is a file and stays as it is
         choices = Sdf.Layer.CreateAnonymous("session.usda")
         choices.subLayerPaths = [] if over is None else [over.identifier]
@@ -62,9 +63,9 @@ def usd_warnings(path: Path, report: Report | None) -> Iterator[None]:
             report.add(Kind.INVALID, "usd-warning", SourceRef(path), "", _warning(said.commentary))
 
 
-def _layer(path: Path) -> Sdf.Layer:
-    if not path.is_file():
-        raise InputError(path, "no such file")
+def open_layer(path: Path) -> Sdf.Layer:
+    """The layer in a file. Raises InputError."""
+    check_input(path)
     try:
         layer = Sdf.Layer.FindOrOpen(str(path))
     except Tf.ErrorException as problem:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from pxr import Gf, Usd, UsdGeom
@@ -29,12 +29,30 @@ def area_scales(stage: Usd.Stage, placed: Iterable[PlacedMesh], copies: Copies) 
     return found
 
 
-def footprint(stage: Usd.Stage) -> float:
-    """m2 of ground below the bounding box of all that is visible, at the first time."""
+def extents(stage: Usd.Stage) -> tuple[float, float]:
+    """Of the bounding box of all that is visible, at the first time: its diagonal, m, and the
+    ground below it, m2.
+    """
     cache = UsdGeom.BBoxCache(Usd.TimeCode.EarliestTime(), [UsdGeom.Tokens.default_])
     box = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
     if box.IsEmpty():
-        return 0.0
-    size: Gf.Vec3d = box.GetSize() * UsdGeom.GetStageMetersPerUnit(stage)
+        return 0.0, 0.0
+    unit = UsdGeom.GetStageMetersPerUnit(stage)
+    size: Gf.Vec3d = box.GetSize() * unit
     up = 1 if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.y else 2
-    return float(np.prod([size[axis] for axis in range(3) if axis != up]))
+    ground = float(np.prod([size[axis] for axis in range(3) if axis != up]))
+    return float(box.GetSize().GetLength()) * unit, ground
+
+
+def level_share(lights: Sequence[Usd.Prim]) -> float:
+    """Of distant lights, what a level ground gets of their lux: the mean cosine, at the first time.
+
+    0 of one that shines from below.
+    """
+    cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
+    shares = []
+    for prim in lights:
+        way = cache.GetLocalToWorldTransform(prim).TransformDir(Gf.Vec3d(0.0, 0.0, -1.0))
+        up = 1 if UsdGeom.GetStageUpAxis(prim.GetStage()) == UsdGeom.Tokens.y else 2
+        shares.append(max(-way.GetNormalized()[up], 0.0))
+    return float(np.mean(shares)) if shares else 0.0

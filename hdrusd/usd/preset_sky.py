@@ -30,7 +30,8 @@ def write_sky_dome(
     if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z:
         turn = UsdGeom.Xformable(dome).AddOrientOp(UsdGeom.XformOp.PrecisionDouble)
         turn.Set(Gf.Quatd(_Z_UP.GetQuat()))
-    write_origin(dome.GetPrim(), light)
+    target = stage.GetEditTarget()
+    write_origin(target.GetPrimSpecForScenePath(path), light)
     return dome.GetPrim()
 
 

@@ -19,7 +19,7 @@ from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdUtils
 
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.report import Kind, Report
-from hdrusd.usd.opening import one_line_of, usd_warnings
+from hdrusd.usd.opening import open_layer, usd_warnings
 
 #: Suffixes of the sources that are stages already.
 STAGES = (".usda", ".usdc", ".usd", ".usdz")
@@ -41,7 +41,7 @@ def open_source(path: Path, allowed: Callable[[Path], bool], report: Report) -> 
     with a finding each. Raises InputError where ``path`` is no layer.
     """
     with usd_warnings(path, report):
-        layer = _opened(path)
+        layer = open_layer(path)
         root = Sdf.Layer.CreateAnonymous("source.usda")
         copy_stage_metadata(layer, root)
         stage = Usd.Stage.Open(root, Sdf.Layer.CreateAnonymous("source-session.usda"))
@@ -54,7 +54,9 @@ def open_source(path: Path, allowed: Callable[[Path], bool], report: Report) -> 
         late = [x.identifier for x in stage.GetUsedLayers() if not _inside(x, allowed)]
         stage.MuteAndUnmuteLayers(late, [])
     for identifier in (*refused, *sorted(late)):
-        text = f"{identifier}: outside the declared roots; not converted. See --root"
+        folder = _file(Sdf.Layer.SplitIdentifier(identifier)[0]).parent
+        text = f"{identifier}: outside the declared roots; not converted; --root {folder} would "
+        text += "allow it"
         report.add(Kind.MISSING, "file-refused", SourceRef(path), "layer", text)
     return stage
 
@@ -152,17 +154,6 @@ def _stand_in(path: Path, identifier: str) -> Sdf.Layer:
     except Tf.ErrorException as problem:  # within a package, or with arguments for its format
         text = f"{identifier}: outside the declared roots; want it inside, or --root"
         raise InputError(path, text) from problem
-
-
-def _opened(path: Path) -> Sdf.Layer:
-    """The root layer. Raises InputError."""
-    try:
-        layer = Sdf.Layer.FindOrOpen(str(path))
-    except Tf.ErrorException as problem:
-        raise InputError(path, f"not a USD layer ({one_line_of(problem)})") from problem
-    if layer is None:
-        raise InputError(path, "not a USD layer")
-    return layer
 
 
 def _file(path: str) -> Path:

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from pxr import Gf, Usd, UsdGeom
+from pxr import Gf, Sdf
 
 from hdrusd.legacy.scene import TRS, Channel, Node
+from hdrusd.usd import specs
 
 #: A held value ends this share of a time code before the next sample.
 _STEP = 1e-3
@@ -25,6 +26,8 @@ _MOST_SAMPLES = 100_000
 
 Doubles = npt.NDArray[np.float64]
 
+_TYPES = Sdf.ValueTypeNames
+
 
 def last_key(nodes: Iterable[Node]) -> float:
     """When the last animation of some nodes ends, those that loop once through, s."""
@@ -33,7 +36,7 @@ def last_key(nodes: Iterable[Node]) -> float:
 
 
 def write_transform(
-    prim: UsdGeom.Xformable, node: Node, codes_per_second: float, end: float = 0.0
+    prim: Sdf.PrimSpec, node: Node, codes_per_second: float, end: float = 0.0
 ) -> None:
     """Author a node's transform; what loops is repeated until ``end``, s."""
     if node.animation:
@@ -42,7 +45,8 @@ def write_transform(
     if isinstance(node.transform, TRS):
         _static(prim, node.transform)
     elif node.transform is not None and not np.array_equal(node.transform, np.eye(4)):
-        prim.AddTransformOp().Set(Gf.Matrix4d(np.asarray(node.transform, np.float64)))
+        matrix = Gf.Matrix4d(np.asarray(node.transform, np.float64))
+        specs.move(prim, "transform", _TYPES.Matrix4d, matrix)
 
 
 def at_rest(node: Node) -> TRS:
@@ -68,35 +72,38 @@ def first_matrix(node: Node) -> Doubles:
     return made
 
 
-def _static(prim: UsdGeom.Xformable, trs: TRS) -> None:
+def _static(prim: Sdf.PrimSpec, trs: TRS) -> None:
     if any(trs.translation):
-        prim.AddTranslateOp().Set(Gf.Vec3d(*trs.translation))
+        specs.move(prim, "translate", _TYPES.Double3, Gf.Vec3d(*trs.translation))
     if trs.rotation != (0.0, 0.0, 0.0, 1.0):
-        prim.AddOrientOp(UsdGeom.XformOp.PrecisionDouble).Set(_quaternion(trs.rotation))
+        specs.move(prim, "orient", _TYPES.Quatd, _quaternion(trs.rotation))
     if trs.scale != (1.0, 1.0, 1.0):
-        prim.AddScaleOp(UsdGeom.XformOp.PrecisionDouble).Set(Gf.Vec3d(*trs.scale))
+        specs.move(prim, "scale", _TYPES.Double3, Gf.Vec3d(*trs.scale))
 
 
 def _animate(
-    prim: UsdGeom.Xformable, trs: TRS, channels: tuple[Channel, ...], rate: float, end: float
+    prim: Sdf.PrimSpec, trs: TRS, channels: tuple[Channel, ...], rate: float, end: float
 ) -> None:
-    ops = {
-        "translation": prim.AddTranslateOp(),
-        "rotation": prim.AddOrientOp(UsdGeom.XformOp.PrecisionDouble),
-        "scale": prim.AddScaleOp(UsdGeom.XformOp.PrecisionDouble),
-    }
     driven = {channel.path for channel in channels}
-    if "translation" not in driven:
-        ops["translation"].Set(Gf.Vec3d(*trs.translation))
-    if "rotation" not in driven:
-        ops["rotation"].Set(_quaternion(trs.rotation))
-    if "scale" not in driven:
-        ops["scale"].Set(Gf.Vec3d(*trs.scale))
+    still = {
+        "translation": Gf.Vec3d(*trs.translation),
+        "rotation": _quaternion(trs.rotation),
+        "scale": Gf.Vec3d(*trs.scale),
+    }
+    ops = {
+        part: specs.move(prim, op, kind, None if part in driven else still[part])
+        for part, op, kind in (
+            ("translation", "translate", _TYPES.Double3),
+            ("rotation", "orient", _TYPES.Quatd),
+            ("scale", "scale", _TYPES.Double3),
+        )
+    }
     for channel in channels:
         codes, values = samples(channel, rate, end)
-        op, turns = ops[channel.path], channel.path == "rotation"
+        path, turns = ops[channel.path].path, channel.path == "rotation"
         for code, value in zip(codes.tolist(), values.tolist(), strict=True):
-            op.Set(_quaternion(value) if turns else Gf.Vec3d(*value), Usd.TimeCode(code))
+            told = _quaternion(value) if turns else Gf.Vec3d(*value)
+            prim.layer.SetTimeSample(path, code, told)
 
 
 def samples(channel: Channel, rate: float, end: float) -> tuple[Doubles, Doubles]:

@@ -10,9 +10,9 @@ from pxr import Sdf, Usd, UsdGeom, Vt
 
 from hdrusd.legacy.scene import LegacyScene, Mesh, Node
 from hdrusd.report import Kind, Report
+from hdrusd.usd import specs
 from hdrusd.usd.camera import write_camera
 from hdrusd.usd.fixtures import PlacedMesh
-from hdrusd.usd.material import bind, bind_faces, display_name, keep_extras
 from hdrusd.usd.mesh import write_mesh
 from hdrusd.usd.names import Names
 from hdrusd.usd.sharing import Copies, every_node, shared_nodes
@@ -90,16 +90,35 @@ class TreeWriter:
         self._shared = shared_nodes(scene.roots, self._skeletons.pinned)
         self._prototypes: dict[int, Sdf.Path] = {}  # of nodes, by id
         self._mesh_prototypes: dict[int, Sdf.Path] = {}  # by number
+        self._to_bend: list[tuple[Node, Sdf.Path, list[tuple[Sdf.Path, Mesh]]]] = []
 
     def write(self) -> None:
         """All of it."""
+        # At once: prim by prim they cost a stage the square of their number.
+        with Sdf.ChangeBlock():
+            self._write_nodes()
+        for node, root, bent in self._to_bend:
+            self._skeletons.write(self.stage, root, node)
+            for path, mesh in bent:
+                self._skeletons.bind(self.stage.GetPrimAtPath(path), mesh, root, node)
+        # At the end: what is added to a prototype afterwards is added to each of its places.
+        with Sdf.ChangeBlock():
+            for use, prototype in self.copies.instances.items():
+                spec = self.layer.GetPrimAtPath(use)
+                spec.referenceList.Prepend(Sdf.Reference("", prototype))
+                spec.instanceable = True
+            for path, choice in self._choices.items():
+                write_states(self.layer, path, choice.states, choice.children, self.metres)
+        self.preview()
+
+    def _write_nodes(self) -> None:
         self._make_prototypes()
         stack = self._entered(self.scene.roots, self.root, [True] * len(self.scene.roots))
         while stack:
             node, path, shown = stack.pop()
             if id(node) in self._shared:
                 if not shown:
-                    UsdGeom.Imageable(self.stage.GetPrimAtPath(path)).MakeInvisible()
+                    specs.hide(self.layer.GetPrimAtPath(path))
                 prototype = self._prototypes[id(node)]
                 written = prototype in self.copies.uses
                 self.copies.add(path, prototype)
@@ -111,15 +130,6 @@ class TreeWriter:
             if path in self._choices:
                 self._choices[path].children = [child for _, child, _ in reversed(below)]
             stack += below
-        # At the end: what is added to a prototype afterwards is added to each of its places.
-        with Sdf.ChangeBlock():
-            for use, prototype in self.copies.instances.items():
-                spec = self.layer.GetPrimAtPath(use)
-                spec.referenceList.Prepend(Sdf.Reference("", prototype))
-                spec.instanceable = True
-            for path, choice in self._choices.items():
-                write_states(self.layer, path, choice.states, choice.children, self.metres)
-        self.preview()
 
     def _entered(
         self, nodes: Sequence[Node], parent: Sdf.Path, shown: Sequence[bool]
@@ -129,17 +139,11 @@ class TreeWriter:
         return list(zip(nodes, named, shown, strict=True))[::-1]
 
     def _siblings(self, parent: Sdf.Path, wanted: Sequence[tuple[str, str]]) -> list[Sdf.Path]:
-        """Prims below ``parent``, of names and types, at once.
-
-        One by one they cost a stage the square of their number.
-        """
-        if not wanted:
-            return []
+        """Prims below ``parent``, of names and types."""
         paths = [self.names.child(parent, name) for name, _ in wanted]
-        with Sdf.ChangeBlock():
-            spec = self.layer.GetPrimAtPath(parent)
-            for path, (_, kind) in zip(paths, wanted, strict=True):
-                Sdf.PrimSpec(spec, path.name, Sdf.SpecifierDef, kind)
+        spec = self.layer.GetPrimAtPath(parent)
+        for path, (_, kind) in zip(paths, wanted, strict=True):
+            Sdf.PrimSpec(spec, path.name, Sdf.SpecifierDef, kind)
         return paths
 
     def _make_prototypes(self) -> None:
@@ -148,7 +152,7 @@ class TreeWriter:
         meshes = [index for index, count in self._mesh_uses().items() if count > 1]
         if not nodes and not meshes:
             return
-        self.stage.CreateClassPrim(PROTOTYPES)
+        Sdf.CreatePrimInLayer(self.layer, PROTOTYPES).specifier = Sdf.SpecifierClass
         wanted = [node.name for node in nodes]
         wanted += [self.scene.meshes[index].name for index in meshes]
         paths = self._siblings(PROTOTYPES, [(name, "Xform") for name in wanted])
@@ -184,14 +188,13 @@ class TreeWriter:
     # -- one node --------------------------------------------------------------------------
 
     def _write_node(self, node: Node, path: Sdf.Path, *, visible: bool) -> None:
-        form = UsdGeom.Xform.Define(self.stage, path)
-        prim = form.GetPrim()
-        display_name(prim, node.name)
-        keep_extras(prim, node.extras)
-        write_transform(form, node, CODES_PER_SECOND, self.end)
+        prim = self.layer.GetPrimAtPath(path)
+        specs.display_name(prim, node.name)
+        specs.keep(prim, node.extras)
+        write_transform(prim, node, CODES_PER_SECOND, self.end)
         self._note_loops(node)
         if not visible:
-            form.CreateVisibilityAttr(UsdGeom.Tokens.invisible)
+            specs.hide(prim)
         self.places.append(Place(node, path))
         bent = [index for index in node.meshes if self._bent(node, index)]
         still = [index for index in node.meshes if not self._bent(node, index)]
@@ -206,11 +209,11 @@ class TreeWriter:
                 self._mesh(child, self.scene.meshes[index])
         if bent:
             self._skinned(node, path, bent)
-        for index in node.cameras:
-            camera = self.scene.cameras[index]
-            child = self.names.child(path, camera.name)
-            write_camera(self.stage, child, camera, unit=self.unit)
-            self.cameras.append(child)
+        cameras = [self.scene.cameras[index] for index in node.cameras]
+        paths = self._siblings(path, [(camera.name, "Camera") for camera in cameras])
+        for camera, child in zip(cameras, paths, strict=True):
+            write_camera(self.layer.GetPrimAtPath(child), camera, unit=self.unit)
+        self.cameras += paths
 
     def _note_loops(self, node: Node) -> None:
         loops = [channel for channel in node.animation if channel.loop != "none"]
@@ -222,17 +225,17 @@ class TreeWriter:
             )
             self._finding(Kind.REPLACED, "animation-loop", node, text)
 
-    def _mesh(self, path: Sdf.Path, mesh: Mesh) -> Usd.Prim:
-        prim = write_mesh(self.stage, path, mesh)
-        display_name(prim, mesh.name)
+    def _mesh(self, path: Sdf.Path, mesh: Mesh) -> None:
+        prim = specs.define(self.layer, path, "Mesh")
+        write_mesh(prim, mesh)
+        specs.display_name(prim, mesh.name)
         if mesh.material is not None:
-            bind(prim, self.materials[mesh.material])
+            specs.bind(prim, self.materials[mesh.material])
         for subset in mesh.subsets:
             material = self.materials[subset.material]
             name = self.names.child(path, material.name).name
             faces = Vt.IntArray.FromNumpy(np.ascontiguousarray(subset.faces, np.int32))
-            bind_faces(UsdGeom.Mesh(prim), name, faces, material)
-        return prim
+            specs.bind_faces(prim, name, faces, material)
 
     def _instance(self, path: Sdf.Path, index: int) -> None:
         holder = self._mesh_prototypes[index]
@@ -241,14 +244,18 @@ class TreeWriter:
         self.copies.add(path, holder)
 
     def _skinned(self, node: Node, path: Sdf.Path, meshes: Sequence[int]) -> None:
-        root = self.names.child(path, self._skeletons.bones[id(node)].skin.name)
+        """A SkelRoot with its meshes; its Skeleton is written when the stage has composed them."""
+        (root,) = self._siblings(path, [(self._skeletons.bones[id(node)].skin.name, "SkelRoot")])
         self.names.taken.setdefault(root, {})["Skeleton"] = 1
-        self._skeletons.write(self.stage, root, node)
+        specs.define(self.layer, root.AppendChild("Skeleton"), "Skeleton")
+        bent = []
         for index in meshes:
             mesh = self.scene.meshes[index]
             child = self.names.child(root, mesh.name)
             self.meshes.append(PlacedMesh(child, root, index))
-            self._skeletons.bind(self._mesh(child, mesh), mesh, root, node)
+            self._mesh(child, mesh)
+            bent.append((child, mesh))
+        self._to_bend.append((node, root, bent))
 
     # -- states ----------------------------------------------------------------------------
 
@@ -324,8 +331,10 @@ class TreeWriter:
 
     def together(self, one: Sdf.Path, other: Sdf.Path) -> bool:
         """Whether any state shows two things; paths as they stand on the stage."""
+        if not self._choices:
+            return True
         common = one.GetCommonPrefix(other)
-        choice = self._choices.get(self.copies.written(common)) if self._choices else None
+        choice = self._choices.get(self.copies.written(common))
         if choice is None or common in (one, other):
             return True
         names = [path.GetPrefixes()[common.pathElementCount].name for path in (one, other)]

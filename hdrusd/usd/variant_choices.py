@@ -39,6 +39,11 @@ class Brought:
 
     def has(self, overs: Overs, prim: Usd.Prim) -> bool:
         """Whether a prim is there by the variant, or has something from it."""
+        if not prim.IsInPrototype() and not prim.IsInstanceProxy():
+            # Its one place is its path, with variants: to be asked of a whole stage, each time.
+            below = str(Sdf.Path(self.prim).StripAllVariantSelections())
+            if not str(prim.GetPath()).startswith(below):
+                return False
         return any(
             text.startswith(self.prim) and self.selection in text[len(self.prim) :]
             for text in overs.places(prim)

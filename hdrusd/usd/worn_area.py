@@ -1,8 +1,8 @@
-"""The area of the lamps that wear a material: ``lamp_area``, from the meshes that were placed."""
+"""The area of the lamps that wear a material: ``LampAreas``, from the meshes that were placed."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -17,47 +17,61 @@ from hdrusd.usd.triangles import corners
 Doubles = npt.NDArray[np.float64]
 
 
-def lamp_area(
-    stage: Usd.Stage,
-    scene: LegacyScene,
-    placed: Sequence[PlacedMesh],
-    copies: Copies,
-    material: int,
-) -> LampArea | None:
-    """Of what one mesh has of a material, which is taken for one lamp; the mean of all meshes.
+class LampAreas:
+    """Of the meshes of one stage, as they stand at its first time, each where it first stands.
 
-    As they stand at the stage's first time, each mesh where it first stands. None where no mesh
-    wears it, or only over no area.
+    ``wearers``: the meshes that have each material.
     """
-    cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
-    unit = UsdGeom.GetStageMetersPerUnit(stage)
-    faces: dict[int, Doubles] = {}
-    lamps: list[LampArea] = []
-    for mesh in placed:
-        if mesh.mesh not in faces:
-            faces[mesh.mesh] = _faces(scene.meshes[mesh.mesh], material)
-        if len(faces[mesh.mesh]):
-            world = _world(cache, stage, copies.first(mesh.node))
-            with np.errstate(all="ignore"):
-                lamps.append(LampArea.of(faces[mesh.mesh] @ _cofactors(world) * unit**2))
-    return mean_area(lamps)
+
+    def __init__(
+        self,
+        stage: Usd.Stage,
+        scene: LegacyScene,
+        placed: Sequence[PlacedMesh],
+        copies: Copies,
+        wearers: Mapping[int | None, Sequence[int]],
+    ) -> None:
+        self.stage = stage
+        self.scene = scene
+        self.placed = placed
+        self.copies = copies
+        self.wearers = wearers
+        self._cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
+        self._unit = UsdGeom.GetStageMetersPerUnit(stage)
+        self._places: dict[int, list[int]] = {}  # in ``placed``, by mesh
+        for number, mesh in enumerate(placed):
+            self._places.setdefault(mesh.mesh, []).append(number)
+
+    def of(self, material: int) -> LampArea | None:
+        """Of what one mesh has of a material, which is taken for one lamp; the mean of all meshes.
+
+        None where no mesh wears it, or only over no area.
+        """
+        meshes = self.wearers.get(material, ())
+        faces = {index: _faces(self.scene.meshes[index], material) for index in meshes}
+        lamps: list[LampArea] = []
+        for number in sorted(place for index in meshes for place in self._places.get(index, ())):
+            mesh = self.placed[number]
+            if len(faces[mesh.mesh]):
+                world = self._world(self.copies.first(mesh.node))
+                with np.errstate(all="ignore"):
+                    own = faces[mesh.mesh] @ _cofactors(world) * self._unit**2
+                    lamps.append(LampArea.of(own))
+        return mean_area(lamps)
+
+    def _world(self, path: Sdf.Path) -> Doubles:
+        matrix = self._cache.GetLocalToWorldTransform(self.stage.GetPrimAtPath(path))
+        return np.array(matrix, np.float64)[:3, :3]
 
 
 def _faces(mesh: Mesh, material: int) -> Doubles:
     """(t, 3) area vectors of the triangles that wear a material, in the mesh's own units."""
-    wears = np.full(len(mesh.face_counts), mesh.material == material)
-    for subset in mesh.subsets:
-        wears[subset.faces] = subset.material == material
+    wears = mesh.wears(material)
     if not wears.any():
         return np.empty((0, 3))
     triangles = corners(mesh.face_counts, mesh.face_indices, left_handed=False).select(wears)
     a, b, c = np.moveaxis(mesh.points[triangles.vertex].astype(np.float64), 1, 0)
     return np.asarray(0.5 * np.cross(b - a, c - a))
-
-
-def _world(cache: UsdGeom.XformCache, stage: Usd.Stage, path: Sdf.Path) -> Doubles:
-    matrix = cache.GetLocalToWorldTransform(stage.GetPrimAtPath(path))
-    return np.array(matrix, np.float64)[:3, :3]
 
 
 def _cofactors(matrix: Doubles) -> Doubles:

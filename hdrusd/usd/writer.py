@@ -9,6 +9,7 @@ street.geometry.usdc     nodes, meshes, cameras, bindings, animation
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom
@@ -16,20 +17,44 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom
 from hdrusd.legacy import scene as legacy
 from hdrusd.photometry.light import PhotometricLight
 from hdrusd.report import Report
+from hdrusd.usd import specs
 from hdrusd.usd.ambient import write_ambient
 from hdrusd.usd.camera import write_camera
 from hdrusd.usd.fixtures import Lamp, PlacedMesh
 from hdrusd.usd.freed_lamps import free_lamps
 from hdrusd.usd.layer_files import new_layer, save_layer
-from hdrusd.usd.light import write_legacy_falloff, write_light
+from hdrusd.usd.light import light_type, write_legacy_falloff, write_light, write_light_spec
 from hdrusd.usd.light_string import write_light_string
-from hdrusd.usd.material import display_name, keep_extras
 from hdrusd.usd.names import Names
+from hdrusd.usd.placed import extents
 from hdrusd.usd.settings import Settings, write_settings
 from hdrusd.usd.transform import aim, is_flat, rigid, uniform_scale
 from hdrusd.usd.tree import CODES_PER_SECOND, PROTOTYPES, Place, TreeWriter
 
 LAYERS = ("photometry", "look", "geometry")
+
+
+@dataclass(frozen=True, slots=True)
+class LightAt:
+    """A light at a node; ``right``: where its +X points, C = 0 of a photometric file.
+
+    ``path``: of ``light_path``; None: the next one.
+    """
+
+    place: Place
+    source: legacy.Light
+    light: PhotometricLight
+    right: legacy.Vec3 | None = None
+    path: Sdf.Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _World:
+    """The space of a node: to the world's, its mean scale, and whether it is even."""
+
+    matrix: Gf.Matrix4d
+    scale: float
+    even: bool
 
 
 class StageWriter:
@@ -113,7 +138,8 @@ class StageWriter:
         """A camera at a node that the photometry file names; where it first stands."""
         self._edit("geometry")
         path = self.names.child(place.path, camera.name)
-        write_camera(self.stage, path, camera, unit=self.unit)
+        with Sdf.ChangeBlock():
+            write_camera(specs.define_on(self.stage, path, "Camera"), camera, unit=self.unit)
         return self.tree.copies.first(path)
 
     def set_visible(self, place: Place, *, visible: bool) -> None:
@@ -134,81 +160,79 @@ class StageWriter:
         # at once: one by one they cost a stage the square of their number.
         with Sdf.ChangeBlock():
             for path in self.materials:
-                spec = Sdf.CreatePrimInLayer(self.layers[layer], path)
-                spec.specifier = Sdf.SpecifierDef
-                spec.typeName = "Material"
+                specs.define(self.layers[layer], path, "Material")
         for index, path in enumerate(self.materials):
             write(self.stage, index, path)
 
-    def write_light(
-        self,
-        place: Place,
-        source: legacy.Light,
-        light: PhotometricLight,
-        right: tuple[float, float, float] | None = None,
-    ) -> Usd.Prim:
-        """A light at its node, into the photometry layer; ``right``: where its +X points, C = 0.
+    def light_path(self, place: Place, source: legacy.Light) -> Sdf.Path:
+        """A free path at a node for a light, whether it is written or not."""
+        return self.names.child(place.path, source.name)
 
-        Of a string of lamps the PointInstancer.
-        """
+    def write_lights(self, lights: Sequence[LightAt]) -> list[Usd.Prim]:
+        """Lights at their nodes, into the photometry layer; of a string the PointInstancer."""
         self._edit("photometry")
-        path = self.names.child(place.path, source.name)
-        # What is in a prototype is in the world where that stands.
-        first = self.tree.copies.first(place.path)
-        node = UsdGeom.Xformable(self.stage.GetPrimAtPath(first))
+        layer = self.layers["photometry"]
+        paths = [each.path or self.light_path(each.place, each.source) for each in lights]
         # What is animated has no value at the default time.
-        world = node.ComputeLocalToWorldTransform(Usd.TimeCode.EarliestTime())
-        if source.positions is None:
-            scale, even = uniform_scale(world)
-            unit = (scale if even else 1.0) * self.meters_per_unit
-            prim = write_light(self.stage, path, light, scale=unit)
-            self._place_light(prim, source, world, even, right)
-        else:
-            prim = write_light_string(
-                self.stage, path, source, light, world, self.meters_per_unit, right
-            )
-        display_name(prim, source.name)
-        write_legacy_falloff(prim, source.range, source.attenuation)
-        keep_extras(prim, source.extras)
-        prim.SetCustomDataByKey(
-            "hdrusd:legacy",
-            {
-                "diffuse": Gf.Vec3d(*source.diffuse),
-                "specular": Gf.Vec3d(*source.specular),
-                "ambient": Gf.Vec3d(*source.ambient),
-                "spotExponent": float(source.spot_exponent),
-            },
-        )
-        return prim
+        cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
+        worlds: dict[Sdf.Path, _World] = {}
+        with Sdf.ChangeBlock():
+            for path, each in zip(paths, lights, strict=True):
+                node, source = each.place.path, each.source
+                if node not in worlds:
+                    # What is in a prototype is in the world where that stands.
+                    first = self.stage.GetPrimAtPath(self.tree.copies.first(node))
+                    matrix = cache.GetLocalToWorldTransform(first)
+                    worlds[node] = _World(matrix, *uniform_scale(matrix))
+                if source.positions is None:
+                    prim = specs.define(layer, path, light_type(each.light))
+                    world = worlds[node]
+                    unit = (world.scale if world.even else 1.0) * self.meters_per_unit
+                    write_light_spec(prim, each.light, scale=unit)
+                    self._place_light(prim, each, world)
+                else:
+                    prim = specs.define(layer, path, "PointInstancer")
+                self._keep_source(prim, source)
+        for path, each in zip(paths, lights, strict=True):
+            if each.source.positions is not None:
+                world = worlds[each.place.path]
+                string = (each.source, each.light, world.matrix, self.meters_per_unit, each.right)
+                write_light_string(self.stage, path, *string)
+        return [self.stage.GetPrimAtPath(path) for path in paths]
 
-    def _place_light(
-        self,
-        prim: Usd.Prim,
-        source: legacy.Light,
-        world: Gf.Matrix4d,
-        even: bool,
-        right: tuple[float, float, float] | None,
-    ) -> None:
+    def _keep_source(self, prim: Sdf.PrimSpec, source: legacy.Light) -> None:
+        """What the source says of a light, beside what it means."""
+        specs.display_name(prim, source.name)
+        write_legacy_falloff(prim, source.range, source.attenuation)
+        said = {
+            "diffuse": Gf.Vec3d(*source.diffuse),
+            "specular": Gf.Vec3d(*source.specular),
+            "ambient": Gf.Vec3d(*source.ambient),
+            "spotExponent": float(source.spot_exponent),
+        }
+        specs.keep(prim, source.extras, legacy=said)
+
+    def _place_light(self, prim: Sdf.PrimSpec, placed: LightAt, world: _World) -> None:
         """Position and aim below the node; a skewed space above is undone, once."""
-        form = UsdGeom.Xformable(prim)
-        turn = aim(source.direction, right)
-        if not even:
+        source, types = placed.source, Sdf.ValueTypeNames
+        turn = aim(source.direction, placed.right)
+        if not world.even:
             # A lamp is not squeezed by its node's scale: own space = rigid part of the node's.
             local = Gf.Matrix4d(1.0)
             if turn is not None:
                 local.SetRotateOnly(turn)
             local.SetTranslateOnly(Gf.Vec3d(*source.position))
-            goal = rigid(local * world)
-            if not is_flat(world):
-                goal *= world.GetInverse()
+            goal = rigid(local * world.matrix)
+            if not is_flat(world.matrix):
+                goal *= world.matrix.GetInverse()
             else:  # a space without volume cannot be undone, only left
-                form.SetResetXformStack(True)
-            form.AddTransformOp().Set(goal)
+                specs.reset_moves(prim)
+            specs.move(prim, "transform", types.Matrix4d, goal)
             return
         if any(source.position):
-            form.AddTranslateOp().Set(Gf.Vec3d(*source.position))
+            specs.move(prim, "translate", types.Double3, Gf.Vec3d(*source.position))
         if turn is not None and source.kind != "ambient":
-            form.AddOrientOp(UsdGeom.XformOp.PrecisionDouble).Set(Gf.Quatd(turn))
+            specs.move(prim, "orient", types.Quatd, Gf.Quatd(turn))
 
     def free_lamps(self, lamps: Sequence[Lamp]) -> None:
         """Find the fixtures of lamps, and leave them out of their shadows."""
@@ -235,9 +259,7 @@ class StageWriter:
 
     def diagonal(self) -> float:
         """Of the whole scene in its selected states, m."""
-        cache = UsdGeom.BBoxCache(Usd.TimeCode.EarliestTime(), [UsdGeom.Tokens.default_])
-        box = cache.ComputeWorldBound(self.stage.GetPseudoRoot()).ComputeAlignedRange()
-        return 0.0 if box.IsEmpty() else float(box.GetSize().GetLength()) * self.meters_per_unit
+        return extents(self.stage)[0]
 
     def save(self) -> None:
         """Select states and write all layers; the root, which names them, last. Raises OSError."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import subprocess
 import sys
@@ -54,13 +55,25 @@ class CommandLine:
         return lines[0]
 
 
-def process(*arguments: object, **environment: str) -> Said:
-    """Run ``hdrusd`` in a process of its own."""
+#: ``hdrusd`` in a process of its own; arguments follow.
+HDRUSD = (sys.executable, "-c", "from hdrusd.cli import main; main()")
+
+
+def process(*arguments: object, permitted: bool = True, **environment: str) -> Said:
+    """Run ``hdrusd`` in a process of its own; not ``permitted``: file modes bind root too."""
     done = subprocess.run(
-        [sys.executable, "-c", "from hdrusd.cli import main; main()", *map(str, arguments)],
+        [*HDRUSD, *map(str, arguments)],
         capture_output=True,
         text=True,
         env=os.environ | environment,
+        preexec_fn=None if permitted else _bound_by_modes,
         check=False,
     )
     return Said(done.returncode, done.stdout, done.stderr)
+
+
+def _bound_by_modes() -> None:
+    """Without CAP_DAC_OVERRIDE and CAP_DAC_READ_SEARCH (capability.h), in what is run next."""
+    system, drop_bounding = ctypes.CDLL(None), 24  # PR_CAPBSET_DROP of prctl.h
+    for capability in (1, 2):
+        system.prctl(drop_bounding, capability, 0, 0, 0)  # refused to who has none anyway

@@ -115,6 +115,6 @@ def test_one_image_and_a_wrong_output_are_one_line(hdrusd: CommandLine, files: l
     output = folder / "lamp.exr"
     assert "want 2 to 64" in hdrusd.refused("bracket", files[0], "-o", output, code=3)
     assert "ends in .exr" in hdrusd.refused("bracket", *files, "-o", folder / "a.png", code=2)
-    assert "no such image" in hdrusd.refused(
+    assert "no such file" in hdrusd.refused(
         "bracket", folder / "x.jpg", files[0], "-o", output, code=3
     )

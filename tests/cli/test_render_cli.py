@@ -165,7 +165,7 @@ def test_half_and_petit2010(hdrusd: CommandLine, tmp_path: Path) -> None:
         (["{stage}"], 2, "Missing argument 'OUTPUT'"),
         (["-", "a.exr"], 3, "-: no such file"),
         (["none.usda", "a.exr"], 3, "none.usda: no such file"),
-        (["/dev/zero", "a.exr"], 3, "zero: no such file"),
+        (["/dev/zero", "a.exr"], 3, "zero: not a regular file"),
         ([".", "a.exr"], 2, "is a directory"),
         (["{stage}", "a.exr", "--camera", "/Nope"], 3, "/Nope: no such camera; the stage has"),
         (["{stage}", "a.exr", "-f", "1:3"], 2, "a.exr: no frame placeholder"),

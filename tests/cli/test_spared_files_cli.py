@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import resource
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from builders import obj
+from builders import obj, png
 from command_line import CommandLine, process
 
+LUMINAIRE = Path(__file__).parents[1] / "truth_stages" / "luminaire.ies"
 KD = "Kd 0.5 0.5 0.5"
 
 
@@ -92,20 +94,43 @@ def test_a_stage_that_usd_cannot_name_is_refused(hdrusd: CommandLine, tmp_path: 
     assert line == "wall.usda: the path has a '\\n' in it; want one of printable characters"
 
 
-def test_a_full_disk_is_one_line_about_the_output(tmp_path: Path) -> None:
-    source, stage = obj(tmp_path / "wall.obj", KD), tmp_path / "out" / "wall.usda"
+@contextmanager
+def files_of_at_most(size: int) -> Iterator[None]:
+    """Programs that are started here can write files of so many bytes, as on a full disk."""
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # so writing says EFBIG
-    resource.setrlimit(resource.RLIMIT_FSIZE, (200, limits[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
     try:
-        said = process("convert", str(source), str(stage), "-q")
+        yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
         signal.signal(signal.SIGXFSZ, ignored)
+
+
+@pytest.mark.parametrize("mtl", [KD, f"{KD}\nmap_Kd wall.png"])  # a layer; a texture
+def test_a_full_disk_is_one_line_about_the_output(tmp_path: Path, mtl: str) -> None:
+    png(tmp_path / "wall.png")
+    source, stage = obj(tmp_path / "wall.obj", mtl), tmp_path / "out" / "wall.usda"
+    with files_of_at_most(200):
+        said = process("convert", str(source), str(stage), "-q")
     assert said.code == 1
     assert said.err.startswith(f"{stage}: cannot be written (")
     assert len(said.err.splitlines()) == 1
+    assert ".hdrusd-" not in said.err
     assert not stage.parent.exists()
+
+
+def test_nor_a_recipe_or_a_report_of_a_full_disk(tmp_path: Path) -> None:
+    source = obj(tmp_path / "wall.obj", KD)
+    with files_of_at_most(20):
+        said = process("recipe", "init", str(source), str(tmp_path / "a.toml"), "-q")
+        told = process("photometry", str(LUMINAIRE), "--report", str(tmp_path / "a.json"))
+    assert said == (1, "", f"{tmp_path / 'a.toml'}: cannot be written (File too large)\n")
+    assert (told.code, told.err) == (
+        1,
+        f"{tmp_path / 'a.json'}: cannot be written (File too large)\n",
+    )
+    assert {path.name for path in tmp_path.iterdir()} == {"wall.obj", "wall.mtl"}
 
 
 def test_a_file_in_place_of_a_folder_is_named(hdrusd: CommandLine, tmp_path: Path) -> None:
@@ -115,12 +140,14 @@ def test_a_file_in_place_of_a_folder_is_named(hdrusd: CommandLine, tmp_path: Pat
     assert line == f"{file}: not a folder; want one to write in"
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+@pytest.mark.parametrize(
+    ("before", "name"), [(["convert", "-q"], "wall.usda"), (["recipe", "init", "-q"], "a.toml")]
+)
 def test_a_folder_without_permission_is_told_by_the_output(
-    hdrusd: CommandLine, tmp_path: Path
+    tmp_path: Path, before: list[str], name: str
 ) -> None:
     source = obj(tmp_path / "wall.obj", KD)
     (tmp_path / "closed").mkdir(mode=0o500)
-    stage = tmp_path / "closed" / "wall.usda"
-    line = hdrusd.refused("convert", source, stage, "-q", code=1)
-    assert line == f"{stage}: cannot be written (Permission denied)"
+    output = tmp_path / "closed" / name
+    said = process(*before, source, output, permitted=False)
+    assert said == (1, "", f"{output}: cannot be written (Permission denied)\n")

@@ -145,3 +145,9 @@ def test_shader_1_shows_the_overcast_skys_lux() -> None:
     lux = sh_polynomials(np.array([0.0, 1.0, 0.0])) @ coefficients
     # The midpoint rule over 128 rows: (pi / 128)^2 / 24 = 3e-5.
     assert lux[0] == pytest.approx(passed * sky.lux, rel=1e-4)
+
+
+def test_what_shines_in_a_sky_has_its_name() -> None:
+    shining = {name: preset.body for name, preset in PRESETS.items() if preset.sky().beam > 0.0}
+    assert shining == {"moonlit": "Moon", "clear-sun": "Sun"}
+    assert {name for name, preset in PRESETS.items() if preset.body} == set(shining)

@@ -98,7 +98,7 @@ def seen(
     return evaluate(
         gl,
         "gpu/shaders/shadow.glsl",
-        f"visibility(p, n, {lamp}, {rows})",
+        f"visibility(p, n, n, {lamp}, {rows})",
         {"p": points - eye, "n": np.tile(np.asarray(normal, float), (len(points), 1))},
         "float",
         uniforms={"shadow_atlas": 0, **shadows.uniforms(kind)},

@@ -170,6 +170,17 @@ def test_broken_skins_leave_a_finding_and_a_stage(
         np.testing.assert_allclose(points, every[CORNERS], atol=1e-6)
 
 
+@pytest.mark.parametrize("many", [16, 17])
+def test_more_joints_than_are_kept_are_told(tmp_path: Path, many: int) -> None:
+    """The first point is held by 16 or 17, in turn by the two joints with weight 1."""
+    pairs = "0 0 1 0 " * (many // 2) + "0 0 " * (many % 2 + 5)
+    rows = f"<vcount>{many} 1 1 1 1 1</vcount><v>{pairs}</v>"
+    _, report = load(tmp_path, skinned(rows=rows, weights="1"))
+    told = [str(f.kind) + " " + f.text for f in report if f.code == "skin-weights"]
+    text = "dropped 1 of 6 points are held by more than 16 joints; the strongest are kept"
+    assert told == [text] * (many > 16)
+
+
 # -- instances ------------------------------------------------------------------------------
 
 

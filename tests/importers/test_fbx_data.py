@@ -37,8 +37,7 @@ def pictures(scene: LegacyScene) -> set[str]:
     """All that materials name: with a slot, or as extras where there is none yet."""
     found = set()
     for material in scene.materials:
-        slots = material.diffuse_map, material.emission_map, material.opacity_map
-        found |= {slot.image.name for slot in slots if slot is not None}
+        found |= {texture.image.name for texture in material.maps().values()}
         words = (word for word in material.extras.values() if isinstance(word, str))
         found |= {word for word in words if word.lower().endswith(".png")}
     return found

@@ -268,9 +268,10 @@ def test_alpha_of_the_diffuse_picture(tmp_path: Path) -> None:
 def test_pictures_without_a_home_are_kept_by_name(tmp_path: Path) -> None:
     fbx = Fbx()
     material = add_material(fbx, "phong")
-    add_texture(fbx, material, "NormalMap", "dents.png")
+    add_texture(fbx, material, "Bump", "dents.png")
     made, report = (scene := load(fbx.write(tmp_path)))[0].materials[0], scene[1]
-    assert made.extras["NormalMap"] == "dents.png"
+    assert made.extras["Bump"] == "dents.png"
+    assert made.normal_map is None
     assert "material-part" in report.codes()
 
 

@@ -17,7 +17,7 @@ from hdrusd.importers.gltf_document import Document
 from hdrusd.importers.gltf_images import uv_transform
 from hdrusd.importers.importer import Limits
 from hdrusd.legacy.scene import Material, UVTransform
-from hdrusd.report import Kind, Report
+from hdrusd.report import Report
 
 DATA = os.environ.get("HDRUSD_TESTDATA")
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(8)
@@ -69,7 +69,11 @@ def test_specular_glossiness_gives_a_legacy_specular(tmp_path: Path) -> None:
     assert result.pbr == {"glossiness": 1.0}
     assert "glossiness" in result.defaults
     assert result.diffuse_map is not None
-    assert "specularGlossinessTexture" in next(f.text for f in report if f.kind == Kind.DROPPED)
+    gloss = result.roughness_map
+    assert gloss is not None
+    assert (gloss.channel, gloss.scale[3], gloss.bias[3]) == ("a", -1.0, 1.0)
+    assert result.specular_map is not None
+    assert "material-part" not in report.codes()
 
 
 def test_emission_is_factor_times_strength_in_nits(tmp_path: Path) -> None:
@@ -117,16 +121,11 @@ def test_wrong_factors_are_clamped_or_replaced_with_a_finding(tmp_path: Path) ->
 
 def test_what_has_no_home_is_one_finding_a_material(tmp_path: Path) -> None:
     source = {
-        "normalTexture": {"index": 0},
-        "occlusionTexture": {"index": 0},
-        "pbrMetallicRoughness": {"metallicRoughnessTexture": {"index": 0}},
-        "extensions": {"KHR_materials_clearcoat": {}},
+        "extensions": {"KHR_materials_sheen": {}, "KHR_materials_transmission": {}},
     }
     _, report = material(tmp_path, source)
     (text,) = [f.text for f in report if f.code == "material-part"]
-    for part in ("normal", "occlusion", "metallicRoughness"):
-        assert f"{part}Texture" in text
-    assert "KHR_materials_clearcoat" in text
+    assert "KHR_materials_sheen, KHR_materials_transmission" in text
 
 
 # Textures and images

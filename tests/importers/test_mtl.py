@@ -159,9 +159,12 @@ def test_the_exponent(tmp_path: Path, text: str, value: float) -> None:
 
 
 def test_pbr_beside_the_record(tmp_path: Path) -> None:
-    loaded = load_material(tmp_path, "Kd 1 1 1\nPr 0.3\nPm 1\nPc 0.5\nmap_Pr rough.png")
-    assert loaded.material.pbr == {"roughness": 0.3, "metallic": 1.0}
-    assert "Pc, map_Pr" in loaded.finding("mtl-dropped").text
+    loaded = load_material(tmp_path, "Kd 1 1 1\nPr 0.3\nPm 1\nPc 0.5\nPs 0.1")
+    assert loaded.material.pbr == {"roughness": 0.3, "metallic": 1.0, "clearcoat": 0.5}
+    assert loaded.finding("mtl-dropped").text.startswith("Ps:")
+    coat = load_material(tmp_path, "Kd 1 1 1\nKs 1 1 1\nNs 20\nPc 0.5")  # of Phong's
+    assert coat.material.pbr is None
+    assert coat.finding("mtl-dropped").text.startswith("Pc:")
 
 
 # Textures
@@ -327,7 +330,6 @@ def test_what_has_no_home_is_one_finding_and_metadata(tmp_path: Path) -> None:
         "Ni": "1.5",
         "Tf": "0.5 1 1",
         "Ps": "0.1",
-        "norm": "n.png",
         "bump": "-bm 2 b.png",
         "map_Ks": "s.png",
         "map_Ns": "n.png",

@@ -100,6 +100,13 @@ WORDS = st.text("0123456789/-+.x", min_size=1, max_size=7)
 @quick
 @example([["1/2/3/4", "5//6"], ["/1", "//", "1//2/3"]])
 @example([["1_0", "+2", "--3", "1.0", "007"]])
+@example([["1/2/3", "4/5/6", "7/8/9"], ["1/2/3", "-4/5/-6", "7/8/9"]])
+@example([["1//3", "4//6", "7//9"]])
+@example([["1/2", "4/5", "7/8"]])
+@example([["1", "4", "7"]])
+@example([["1", "4/5/6"]])  # as many numbers and slashes as of two v/t
+@example([["1//3", "4/5/"], ["/1/2", "1/2/"]])  # as of v//n
+@example([["1/2/3/4", "5/6"]])  # as of v/t/n
 def test_a_broken_word_breaks_only_its_own_corner(lines: list[list[str]]) -> None:
     """Every word alone: up to three integers between slashes, or nothing of it is used."""
     data = "".join(f"f {' '.join(words)}\n" for words in lines).encode()

@@ -7,7 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from osg_builder import HEADER, group, light_source, load, old_group, scene
+from osg_builder import (
+    HEADER,
+    geode,
+    geometry,
+    group,
+    light_source,
+    load,
+    old_group,
+    scene,
+    state_set,
+)
 
 from hdrusd.errors import InputError
 from hdrusd.importers.importer import Limits
@@ -84,11 +94,67 @@ def test_what_a_light_leaves_out(tmp_path: Path) -> None:
     assert (old.ambient, old.diffuse, old.specular) == ((0.05,) * 3, (0.8,) * 3, (0.05,) * 3)
 
 
-@pytest.mark.parametrize(("value", "enabled"), [("ON", True), ("OFF", False)])
-def test_lights_are_switched_by_state(tmp_path: Path, value: str, enabled: bool) -> None:
-    state = f"StateSet TRUE {{\nosg::StateSet {{\nModeList 1 {{\nGL_LIGHT2 {value} \n}}\n}}\n}}"
-    light = load(tmp_path, scene(light_source(f"LightNum 2 \n{WHITE}", state))).light
-    assert light.enabled is enabled
+def mode(value: str, name: str = "GL_LIGHT2") -> str:
+    """A StateSet with a mode."""
+    return state_set(modes=f"{name} {value} ")
+
+
+ON, OFF, UNLIT = mode("ON"), mode("OFF"), mode("OFF", "GL_LIGHTING")
+
+
+@pytest.mark.parametrize(
+    ("own", "above", "drawn", "enabled"),
+    [
+        # Drawn things decide: OpenSceneGraph draws each with the modes that hold there.
+        ("", "", (ON,), True),
+        ("", "", (OFF,), False),
+        (OFF, "", (ON,), True),
+        (OFF, OFF, (ON, OFF), True),
+        (ON, "", (OFF, OFF), False),
+        (ON, OFF, ("",), False),  # what is drawn is below it too
+        # Where they say nothing, what the file says at the light.
+        ("", "", (), True),
+        ("", "", ("",), True),
+        (ON, "", ("",), True),
+        (OFF, "", ("",), False),
+        ("", "", ("", OFF), True),
+        (OFF, "", (), False),
+        ("", OFF, (), False),
+        # What is not lit by any light has no say.
+        ("", "", (UNLIT,), True),
+        (OFF, "", (UNLIT,), False),
+    ],
+)
+def test_lights_are_switched_by_what_they_would_light(
+    tmp_path: Path, own: str, above: str, drawn: tuple[str, ...], enabled: bool
+) -> None:
+    source = light_source(f"LightNum 2 \n{WHITE}", own)
+    things = (geode(geometry(), fields=state) for state in drawn)
+    made = load(tmp_path, scene(source, *things, fields=above))
+    assert made.light.enabled is enabled
+    assert ("osg-light-mode" in made.codes()) == (enabled and own == OFF)
+    assert ("osg-light-scope" in made.codes()) == (drawn == (ON, OFF))
+
+
+def test_what_is_below_a_light_source_is_lit_by_it(tmp_path: Path) -> None:
+    """OpenSceneGraph puts its GL_LIGHTn ON when it has read the light, whatever the file says."""
+    inner = geode(geometry())
+    source = light_source(f"LightNum 2 \n{WHITE}", f"{OFF}\nChildren 1 {{\n{inner}\n}}\n")
+    made = load(tmp_path, scene(source))
+    assert made.light.enabled
+    assert made.finding("osg-light-mode").kind is Kind.ASSUMED
+
+
+def test_the_light_of_another_file(tmp_path: Path) -> None:
+    """The modes of what is drawn count in all files, and so do numbers."""
+    lamp = light_source(f"LightNum 2 \n{WHITE}")
+    (tmp_path / "lamp.osgt").write_text(scene(lamp))
+    named = 'osg::ProxyNode {\nFileNames 1 {\n"lamp.osgt" \n}\n}'
+    made = load(tmp_path, scene(named, geode(geometry(), fields=OFF)))
+    assert not made.light.enabled
+    made = load(tmp_path, scene(named, named, lamp))
+    assert len(made.scene.lights) == 2
+    assert made.finding("osg-light-number").text.startswith("2 lights are GL_LIGHT2")
 
 
 def test_lights_of_one_number_are_all_kept(tmp_path: Path) -> None:

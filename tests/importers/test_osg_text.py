@@ -33,7 +33,7 @@ from osg_builder import (
 
 from hdrusd.errors import InputError
 from hdrusd.importers.importer import Limits
-from hdrusd.importers.osg_text import Document, parse
+from hdrusd.importers.osg_text import Block, Document, parse
 from hdrusd.report import Report
 
 FILE = Path("scene.osgt")
@@ -43,6 +43,38 @@ def parsed(text: str | bytes, limits: Limits | None = None) -> Document:
     """The document of a text."""
     content = text if isinstance(text, bytes) else text.encode()
     return parse(content, FILE, Report(), limits or Limits())
+
+
+def test_lines_are_counted_past_what_nothing_reads() -> None:
+    buffered = "BufferObject TRUE {\n  osg::VertexBufferObject {\n    UniqueID 8 \n  }\n}\n"
+    document = parsed(f"{HEADER}osg::Vec3Array {{\nUniqueID 7 \n{buffered}Binding BIND_OFF \n}}\n")
+    array = document.root.statements[0]
+    binding = document.field(array, "binding")
+    assert binding is not None
+    assert binding.words == ["Binding", "BIND_OFF"]
+    assert binding.line == HEADER.count("\n") + 8
+    assert document.definitions["7"] is array
+
+
+@pytest.mark.parametrize(
+    ("block", "indices"),
+    [
+        (Block(raw=b""), []),
+        (Block(raw=b" \n "), []),
+        (Block(raw=b" 0 2\n7 "), [0, 2, 7]),
+        (Block(raw=b"-1 2"), [-1, 2]),
+        (Block(raw=b"1e2 .5e1 -"), [100, 5, -1]),
+        (Block(raw=b"9007199254740991 9007199254740992"), [9007199254740991, -1]),
+        (Block(raw=b"99999999999999999999 1"), [-1, 1]),
+        (Block(values=np.array([0, 65535], np.uint16)), [0, 65535]),
+        (Block(values=np.array([0, 65535], ">u2")), [0, 65535]),
+        (Block(values=np.array([3, -7], np.int32)), [3, -1]),
+        (Block(values=np.array([4.0, np.nan, np.inf])), [4, -1, -1]),
+    ],
+)
+def test_indices(block: Block, indices: list[int]) -> None:
+    assert block.indices().tolist() == indices
+    assert block.indices().dtype == np.int64
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -85,6 +88,28 @@ def test_a_schema_in_the_file_says_which_fields_there_are(tmp_path: Path) -> Non
     schema = "osg::Object=Name:26 DataVariance:27 \nosg::Node=NodeMask:11 \n"
     found = load(tmp_path, w.file(geode, schema=schema))
     assert (found.root.name, found.root.visible) == ("plate", False)
+
+
+@dataclass(frozen=True)
+class Buffered(Writer):
+    """What a program writes whose arrays and primitive sets have buffer objects."""
+
+    numbers: Iterator[int] = field(default_factory=lambda: count(90))
+
+    def _held(self) -> bytes:
+        own = self.pack("I", 0x8892, 0x88E4) + b"\0"  # what for, how often it changes, no copy
+        buffer = self.object("osg::VertexBufferObject", next(self.numbers), self.named(), own)
+        return self.named() + b"\1" + buffer
+
+
+@pytest.mark.parametrize("sizes", [True, False])
+def test_what_nothing_reads_is_passed_over(tmp_path: Path, sizes: bool) -> None:
+    w = Buffered(sizes=sizes)
+    found = load(tmp_path, w.file(w.group(1, w.geode(2, w.geometry(3)))))
+    assert found.mesh.points.tolist() == np.reshape(SQUARE, (4, 3)).tolist()
+    assert found.faces == [[0, 1, 2]]
+    assert found.mesh.normals is not None
+    assert found.codes() == set()
 
 
 def test_an_object_is_shared_by_its_number(tmp_path: Path) -> None:

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import HERE, new_stage
+from builders import HERE, new_spec, new_stage
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pxr import Gf, Sdf, Usd, UsdGeom
+from pxr import Gf, Usd, UsdGeom
 
 from hdrusd.errors import InputError
 from hdrusd.legacy import scene as legacy
@@ -29,7 +29,8 @@ def read(prim: UsdGeom.Camera, aspect: float = 1.5, unit: float = 1.0, **more: A
 def test_field_of_view_there_and_back(fov: float, aspect: float, unit: float) -> None:
     stage = new_stage(unit)
     source = legacy.Camera("Driver", HERE, fov_y=fov, aspect=aspect, near=0.5, far=100.0)
-    prim = write_camera(stage, Sdf.Path("/Driver"), source, unit=1.0 / unit)
+    write_camera(new_spec(stage, "/Driver", "Camera"), source, unit=1.0 / unit)
+    prim = UsdGeom.Camera.Get(stage, "/Driver")
     back = read(prim, aspect, unit)
     left, right, bottom, top = back.window
     half = math.tan(math.radians(fov) / 2)
@@ -45,7 +46,9 @@ def test_field_of_view_there_and_back(fov: float, aspect: float, unit: float) ->
 @pytest.mark.parametrize("unit", [1.0, 0.01])
 def test_an_orthographic_window_is_in_metres(unit: float) -> None:
     source = legacy.Camera("Plan", HERE, kind="orthographic", height=8.0, aspect=1.5)
-    prim = write_camera(new_stage(unit), Sdf.Path("/Plan"), source, unit=1.0 / unit)
+    stage = new_stage(unit)
+    write_camera(new_spec(stage, "/Plan", "Camera"), source, unit=1.0 / unit)
+    prim = UsdGeom.Camera.Get(stage, "/Plan")
     back = read(prim, 1.5, unit)
     assert back.orthographic
     assert back.window == pytest.approx((-6.0, 6.0, -4.0, 4.0), rel=1e-6)

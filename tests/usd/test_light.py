@@ -169,7 +169,8 @@ def test_what_is_no_light_is_refused() -> None:
 
 def test_range_and_attenuation_are_kept() -> None:
     prim, _ = written(PhotometricLight("point", 10.0), 1.0, 1.0)
-    write_legacy_falloff(prim, 25.0, (1.0, 0.5, 0.25))
+    spec = prim.GetStage().GetRootLayer().GetPrimAtPath(prim.GetPath())
+    write_legacy_falloff(spec, 25.0, (1.0, 0.5, 0.25))
     assert prim.GetAttribute("photometric:legacy:range").Get() == 25.0
     assert prim.GetAttribute("photometric:legacy:attenuation").Get() == Gf.Vec3f(1.0, 0.5, 0.25)
     assert read_light(prim).intensity == 10.0

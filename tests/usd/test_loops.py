@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import new_stage, node, one_square
+from builders import new_spec, new_stage, node, one_square
 from pxr import Usd, UsdGeom
 
 import hdrusd.usd.transform
@@ -29,8 +29,9 @@ def along_x(*values: float) -> list[list[float]]:
 
 
 def positions(made: Node, end: float, codes: Any) -> list[float]:
-    form = UsdGeom.Xform.Define(new_stage(), "/Node")
-    write_transform(form, made, RATE, end)
+    stage = new_stage()
+    write_transform(new_spec(stage, "/Node", "Xform"), made, RATE, end)
+    form = UsdGeom.Xform.Get(stage, "/Node")
     worlds = [form.ComputeLocalToWorldTransform(Usd.TimeCode(code)) for code in codes]
     found = [world.ExtractTranslation()[0] for world in worlds]
     # The same by our own evaluation, which the joints of skins take.
@@ -73,8 +74,9 @@ def test_turns_go_on_round() -> None:
 
     keys = [about_z(angle) for angle in (0.0, 120.0, 240.0, 360.0)]
     turn = channel([0.0, 1.0, 2.0, 3.0], keys, "rotation", loop="loop")
-    form = UsdGeom.Xform.Define(new_stage(), "/Node")
-    write_transform(form, node(animation=(turn,)), RATE, 6.0)
+    stage = new_stage()
+    write_transform(new_spec(stage, "/Node", "Xform"), node(animation=(turn,)), RATE, 6.0)
+    form = UsdGeom.Xform.Get(stage, "/Node")
     for seconds in (0.5, 2.5, 3.5, 5.5):
         world = form.ComputeLocalToWorldTransform(Usd.TimeCode(seconds * RATE))
         angle = math.radians(120.0 * seconds)
@@ -109,6 +111,7 @@ def test_a_loop_ends_with_the_longest_animation(tmp_path: Path) -> None:
 def test_a_loop_is_not_written_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hdrusd.usd.transform, "_MOST_SAMPLES", 10)
     blink = channel([0.0, 1e-3], along_x(0.0, 1.0), loop="swing")
-    form = UsdGeom.Xform.Define(new_stage(), "/Node")
-    write_transform(form, node(animation=(blink,)), RATE, 3600.0)
+    stage = new_stage()
+    write_transform(new_spec(stage, "/Node", "Xform"), node(animation=(blink,)), RATE, 3600.0)
+    form = UsdGeom.Xform.Get(stage, "/Node")
     assert len(form.GetTranslateOp().GetTimeSamples()) <= 10

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import new_stage, square
+from builders import new_spec, new_stage, square
 from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
+from hdrusd.legacy.scene import Mesh
 from hdrusd.report import Report
 from hdrusd.scene import Geometry
 from hdrusd.usd.geometry import GeometryReader, time_varying
@@ -62,8 +63,14 @@ def uv_primvar(mesh: Any, name: str, values: Any, interpolation: str) -> UsdGeom
 # -- writing ------------------------------------------------------------------------------
 
 
+def written(mesh: Mesh) -> Usd.Prim:
+    stage = new_stage()
+    write_mesh(new_spec(stage, "/Wall", "Mesh"), mesh)
+    return stage.GetPrimAtPath("/Wall")
+
+
 def test_a_polygon_stays_a_polygon() -> None:
-    prim = write_mesh(new_stage(), Sdf.Path("/Wall"), square(two_sided=False))
+    prim = written(square(two_sided=False))
     mesh = UsdGeom.Mesh(prim)
     assert list(mesh.GetFaceVertexCountsAttr().Get()) == [4]
     assert mesh.GetSubdivisionSchemeAttr().Get() == "none"
@@ -88,7 +95,7 @@ def test_everything_of_the_record_is_written_and_read() -> None:
         uvs={"st": (second / 10, "vertex"), "st1": (second, "faceVarying")},
         left_handed=True,
     )
-    prim = write_mesh(new_stage(), Sdf.Path("/Wall"), mesh)
+    prim = written(mesh)
     assert UsdGeom.Mesh(prim).GetDoubleSidedAttr().Get() is True
     made = drawn(prim, uvs=("st", "st1"), color="displayColor")
     order = [0, 2, 1, 0, 3, 2]  # left-handed: the other way round
@@ -100,7 +107,7 @@ def test_everything_of_the_record_is_written_and_read() -> None:
 
 
 def test_opaque_colours_have_no_opacity() -> None:
-    prim = write_mesh(new_stage(), Sdf.Path("/Wall"), square(colors=np.ones((4, 4), np.float32)))
+    prim = written(square(colors=np.ones((4, 4), np.float32)))
     assert not UsdGeom.Gprim(prim).GetDisplayOpacityAttr().HasAuthoredValue()
 
 
@@ -111,7 +118,7 @@ def test_a_mesh_without_points_draws_nothing() -> None:
         face_indices=np.zeros(0, np.int32),
         uvs={},
     )
-    assert cut(write_mesh(new_stage(), Sdf.Path("/Wall"), empty)) is None
+    assert cut(written(empty)) is None
 
 
 # -- reading ------------------------------------------------------------------------------

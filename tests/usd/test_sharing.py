@@ -19,7 +19,7 @@ from hdrusd.report import Report
 from hdrusd.scene import Camera, RenderScene
 from hdrusd.usd.extract import StageReader
 from hdrusd.usd.fixtures import Lamp
-from hdrusd.usd.writer import StageWriter
+from hdrusd.usd.writer import LightAt, StageWriter
 
 POINT = PhotometricLight("point", 100.0, radius=0.05)
 
@@ -80,7 +80,7 @@ def written(folder: Path, scene: LegacyScene, **units: float) -> StageWriter:
     )
     made.write_geometry()
     lamps = [
-        Lamp(made.write_light(place, scene.lights[index], POINT), POINT)
+        Lamp(made.write_lights([LightAt(place, scene.lights[index], POINT)])[0], POINT)
         for place in made.places
         for index in place.node.lights
     ]

@@ -19,10 +19,10 @@ from hdrusd.report import Report
 from hdrusd.scene import Camera
 from hdrusd.usd.extract import StageReader
 from hdrusd.usd.fixtures import Lamp
-from hdrusd.usd.placed import area_scales, footprint
+from hdrusd.usd.placed import area_scales, extents
 from hdrusd.usd.states import states_of
 from hdrusd.usd.variants import select_variants
-from hdrusd.usd.writer import StageWriter
+from hdrusd.usd.writer import LightAt, StageWriter
 
 POINT = PhotometricLight("point", 100.0, radius=0.05)
 NEVER = 1e9
@@ -127,7 +127,7 @@ def test_bounding_boxes_and_the_diagonal_are_of_one_state(tmp_path: Path) -> Non
     tree = detail(children=[near, far], lod_ranges=((0.0, 50.0), (50.0, NEVER)))
     made = written(tmp_path, scene_of(tree, count=2))
     assert made.diagonal() == pytest.approx(2.0**0.5)
-    assert footprint(made.stage) == pytest.approx(1.0)
+    assert extents(made.stage)[1] == pytest.approx(1.0)
     areas = area_scales(made.stage, made.meshes, made.tree.copies)
     assert areas == {0: pytest.approx(1.0), 1: 0.0}
     made.set_visible(next(p for p in made.places if p.node is far), visible=True)
@@ -236,7 +236,7 @@ def test_a_lamp_in_a_state_shines_in_that_state(tmp_path: Path) -> None:
     lights = node("lights", children=children, kind="switch", switch_on=(True, False))
     made = written(tmp_path, scene_of(lights, count=2, lights=[lamp()]))
     lamps = [
-        Lamp(made.write_light(place, lamp(), POINT), POINT)
+        Lamp(made.write_lights([LightAt(place, lamp(), POINT)])[0], POINT)
         for place in made.places
         for _ in place.node.lights
     ]
@@ -278,7 +278,7 @@ def test_a_fixture_of_another_state_is_none(tmp_path: Path) -> None:
         folder.mkdir()
         made = written(folder, one_square(roots=[tree], meshes=[box], lights=[lamp()]))
         place = next(place for place in made.places if place.node is fine)
-        it = Lamp(made.write_light(place, lamp(), POINT), POINT)
+        it = Lamp(made.write_lights([LightAt(place, lamp(), POINT)])[0], POINT)
         made.free_lamps([it])
         assert len(it.fixtures) == fixtures
 

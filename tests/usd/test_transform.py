@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import new_stage, node
+from builders import new_spec, new_stage, node
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pxr import Gf, Usd, UsdGeom
@@ -34,11 +34,11 @@ QUATERNIONS = (
 
 
 def written(transform: Any = None, *channels: Channel) -> tuple[UsdGeom.Xform, float]:
-    form = UsdGeom.Xform.Define(new_stage(), "/Node")
+    stage = new_stage()
     made = node(transform=transform, animation=channels)
     end = last_key([made])
-    write_transform(form, made, RATE, end)
-    return form, end * RATE
+    write_transform(new_spec(stage, "/Node", "Xform"), made, RATE, end)
+    return UsdGeom.Xform.Get(stage, "/Node"), end * RATE
 
 
 def matrix(form: UsdGeom.Xform, code: float | None = None) -> np.ndarray:

@@ -178,7 +178,7 @@ def test_textured_dome_is_no_ambient_light(tmp_path: Path) -> None:
 
 
 def test_check_that_breaks_down_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise RuntimeError("no more")
 
     monkeypatch.setattr(validation.lux, "read_lux", broken)

@@ -18,7 +18,7 @@ from hdrusd.report import Report
 from hdrusd.usd.light import read_light_row
 from hdrusd.usd.lux import read_lux
 from hdrusd.usd.names import unique
-from hdrusd.usd.writer import StageWriter
+from hdrusd.usd.writer import LightAt, StageWriter
 
 
 def writer(
@@ -55,7 +55,7 @@ def rows(made: StageWriter, light: PhotometricLight, source: legacy.Light) -> li
     found = []
     for place in made.places:
         for _ in place.node.lights:
-            prim = made.write_light(place, source, light)
+            prim = made.write_lights([LightAt(place, source, light)])[0]
             world = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0)
             row = read_light_row(prim, Usd.TimeCode(0), world, made.meters_per_unit, made.report)
             assert row is not None

@@ -41,6 +41,9 @@ uniform vec2 beam_edge;       // inner, 1/width
 struct Surface {
     vec3 p;          // m, relative to the eye
     vec3 n;          // unit normal
+#ifdef SHADOWED
+    vec3 plane;      // that of the surface without its bumps
+#endif
     vec3 v;          // unit vector to the eye
     float nv;
     float gloss;     // code of g_diffuse.w: shininess, or minus alpha
@@ -184,6 +187,40 @@ void reflect_light(Surface s, Arrival a)
 #define ADD(i) { ARRIVAL(i) REFLECT }
 #define ADD_CONE(i) { CONE_ARRIVAL(i) REFLECT }
 
+#if defined(SHADOWED) && defined(BUMPED)
+// Place relative to the eye of what a neighbouring pixel shows, m; 0 where there is none.
+vec3 place_beside(vec2 pixel, vec3 its_ray, out float depth)
+{
+    vec2 at = window + pixel;
+    bool there = min(at.x, at.y) > 0.0 && max(at.x, at.y) < 1.0;
+    depth = there ? textureLod(g_normal, at, 0.0).w : 0.0;
+#ifdef ORTHOGRAPHIC
+    return its_ray + forward * depth;
+#else
+    return its_ray * depth;
+#endif
+}
+
+// From a pixel's place to that of a neighbour in its plane: of two the one nearer in depth.
+vec3 step_in_plane(vec3 p, float depth, vec2 pixel, vec3 turn)
+{
+    float a, b;
+    vec3 ahead = place_beside(pixel, ray + turn, a), back = place_beside(-pixel, ray - turn, b);
+    return abs(a - depth) <= abs(b - depth) ? ahead - p : p - back;
+}
+
+// The normal of the triangle that is seen; n where it has no neighbour.
+vec3 flat_normal(vec3 p, float depth, vec3 n, vec3 v)
+{
+    vec2 pixel = 1.0 / vec2(textureSize(g_normal, 0));
+    vec3 found = cross(step_in_plane(p, depth, vec2(pixel.x, 0.0), dFdx(ray)),
+                       step_in_plane(p, depth, vec2(0.0, pixel.y), dFdy(ray)));
+    found *= inversesqrt(max(dot(found, found), 1e-30));
+    float side = dot(found, v);
+    return abs(side) > 1e-3 ? found * sign(side) : n;
+}
+#endif
+
 void main()
 {
     Surface s;
@@ -197,6 +234,11 @@ void main()
     s.v = -normalize(ray);
 #endif
     s.nv = dot(s.n, s.v);
+#if defined(SHADOWED) && defined(BUMPED)
+    s.plane = flat_normal(s.p, normal.w, s.n, s.v);
+#elif defined(SHADOWED)
+    s.plane = s.n;
+#endif
     vec4 diffuse = textureLod(g_diffuse, window, 0.0);
     s.gloss = diffuse.w;
 #if defined(LINKED) || defined(COATED)

@@ -102,16 +102,17 @@ float shadow_tile(vec3 p, vec3 n, ShadowLight light, vec4 rows[6], vec2 shear, v
 }
 #endif
 
-// p: surface point (m, relative to the eye); n: its unit normal, on the lit side.
-float visibility(vec3 p, vec3 n, ShadowLight light, vec4 rows[SHADOW_ROWS])
+// p: surface point (m, relative to the eye); n: its unit normal, on the lit side; plane: that of
+// the surface without its bumps, by which p is lifted off it.
+float visibility(vec3 p, vec3 n, vec3 plane, ShadowLight light, vec4 rows[SHADOW_ROWS])
 {
     // G-buffer and light are float32 relative to the eye.
     float rounding = shadow_rounding + 1e-6 * sqrt(dot(p, p));
 #if !defined(SHADOW_AREA)
 #if defined(SHADOW_ORTHO)
-    return shadow_tile(p, n, light, rows, vec2(0.0), vec2(0.0), rounding);
+    return shadow_tile(p, plane, light, rows, vec2(0.0), vec2(0.0), rounding);
 #else
-    return shadow_tile(p - light.place, n, light, rows, rows[0].w, vec2(0.0), rounding);
+    return shadow_tile(p - light.place, plane, light, rows, rows[0].w, vec2(0.0), rounding);
 #endif
 #else
     float seen = 0.0, all = 0.0;
@@ -130,7 +131,8 @@ float visibility(vec3 p, vec3 n, ShadowLight light, vec4 rows[SHADOW_ROWS])
         vec2 tile = vec2(k % across, k / across);
 #if defined(SHADOW_SUN)
         float weight = 1.0;
-        float lit = shadow_tile(p, n, light, rows, point.xy * light.radius, tile, rounding);
+        vec2 shear = point.xy * light.radius;
+        float lit = shadow_tile(p, plane, light, rows, shear, tile, rounding);
 #else
         // What the point gives: cos at the surface, cos at the light, 1 / d^2.
         vec3 d = p - light.place - frame * point.xyz;
@@ -146,8 +148,8 @@ float visibility(vec3 p, vec3 n, ShadowLight light, vec4 rows[SHADOW_ROWS])
         vec2 at = vec2(dot(d, rows[1].xyz), dot(d, cross(light.axis, rows[1].xyz)));
         weight = max(abs(at.x), abs(at.y)) < w ? weight : 0.0;
 #endif
-        float lit = shadow_tile(d, n, light, rows, max(rows[0].w, light.radius * point.w), tile,
-                                rounding);
+        float lit = shadow_tile(d, plane, light, rows, max(rows[0].w, light.radius * point.w),
+                                tile, rounding);
 #endif
         seen += weight * lit;
         all += weight;

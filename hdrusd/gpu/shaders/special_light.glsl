@@ -45,7 +45,7 @@ Arrival special_arrival(Surface s, int at)
     for (int k = 0; k < SHADOW_ROWS; ++k)
         rows[k] = data[at + 6 + k];
     ShadowLight lamp = ShadowLight(place.xyz, axis.xyz, x.xyz, y.xyz, more.w);
-    strength *= visibility(s.p, s.n, lamp, rows);
+    strength *= visibility(s.p, s.n, s.plane, lamp, rows);
 #endif
 #if defined(RECT)
     float received = rect_illuminance(to, s.n, axis.xyz, x.xyz, y.xyz);

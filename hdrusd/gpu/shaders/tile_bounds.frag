@@ -2,6 +2,9 @@
 uniform sampler2D g_normal;    // unit normal; distance along the view axis, m
 uniform sampler2D g_diffuse;   // reflectance; gloss code
 uniform sampler2D g_specular;  // reflectance at normal incidence; metallic
+#ifdef COATED
+uniform sampler2D g_extra;     // clear coat: weight, alpha
+#endif
 layout(location = 0) out vec4 bounds;  // least, largest distance (m); width of the narrowest lobe;
                                        // 1 Blinn-Phong + 2 GGX
 
@@ -18,6 +21,12 @@ void main()
             ivec2 at = ivec2(x, y);
             float z = texelFetch(g_normal, at, 0).w;
             bool seen = z > 0.0;
+#ifdef COATED
+            vec2 coat = texelFetch(g_extra, at, 0).xy;
+            bool coated = seen && coat.x > 0.0;
+            ggx = ggx || coated;
+            lobe = coated ? min(lobe, coat.y) : lobe;
+#endif
             depth = seen ? vec2(min(depth.x, z), max(depth.y, z)) : depth;
 #ifdef GLOSSY
             float code = texelFetch(g_diffuse, at, 0).w;

@@ -1,0 +1,140 @@
+"""The account of many conversions: sums, and what to fix first in all of them."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from hdrusd.account.fix_first import MOST
+from hdrusd.photometry.sidecar import Unmatched
+
+Row = Mapping[str, Any]
+
+FORMAT = "hdrusd-batch/1"
+
+#: Files that an entry of what to fix first names.
+_NAMED = 3
+
+#: Totals of one conversion that are counts by name.
+_BY_NAME = ("lamps_by_rule", "lamps_by_confidence", "textures_by_class", "findings_by_kind")
+
+
+@dataclass(frozen=True, slots=True)
+class Converted:
+    """One file of a batch. ``document``: ``Result.as_dict()``, or the findings of a refusal."""
+
+    source: Path
+    output: Path
+    document: Mapping[str, Any]
+    code: int = 0  # the exit code of a conversion of this file alone
+    error: str = ""  # the line of a refusal
+    photometry: Path | None = None  # where it is shared with other files
+    unmatched: Sequence[Unmatched] = ()  # its patterns that fit nothing here
+
+
+@dataclass(slots=True)
+class _Fix:
+    """Entries that are mended in one way, of several files."""
+
+    impact: float = 0.0
+    most: Row = field(default_factory=lambda: {"impact": -1.0})  # the gravest of them
+    files: list[str] = field(default_factory=list)
+
+
+def unused_patterns(rows: Sequence[Converted]) -> list[Unmatched]:
+    """The patterns of shared photometry files that fit nothing in any file."""
+    sharing: dict[Path, list[set[Unmatched]]] = defaultdict(list)
+    for row in rows:
+        if row.photometry is not None and not row.code:
+            sharing[row.photometry].append({_by_place(u) for u in row.unmatched})
+    common = (set.intersection(*sets) for sets in sharing.values())
+    return sorted((u for found in common for u in found), key=lambda u: str(u.place))
+
+
+def _by_place(pattern: Unmatched) -> Unmatched:
+    """Why it fits nothing may differ from file to file."""
+    return Unmatched(pattern.place, pattern.pattern, "nothing of that name in any file")
+
+
+def batch_document(rows: Sequence[Converted]) -> dict[str, Any]:
+    """JSON form: docs/report.md."""
+    converted = [row for row in rows if not row.code]
+    sums = _totals([row.document["totals"] for row in converted])
+    unused = unused_patterns(rows)
+    findings = sum(sums["findings_by_kind"].values())
+    return {
+        "format": FORMAT,
+        "summary": f"{len(converted)} of {len(rows)} files converted, {findings} findings in them",
+        "totals": {"files": len(rows), "converted": len(converted), **sums},
+        "findings_by_code": _codes(rows),
+        "unused_patterns": [
+            {"place": str(u.place), "pattern": u.pattern, "text": u.text} for u in unused
+        ],
+        "fix_first": _fix_first(converted),
+        "files": [_file(row) for row in rows],
+    }
+
+
+def _file(row: Converted) -> dict[str, Any]:
+    own = {
+        "source": str(row.source),
+        "output": None if row.code else str(row.output),
+        "code": row.code,
+        "error": row.error or None,
+    }
+    return own | {"report": dict(row.document)}
+
+
+def _totals(rows: Iterable[Row]) -> dict[str, Any]:
+    """The sums of sums; lumens of the lamps whose flux is known."""
+    rows = list(rows)
+    sums: dict[str, Any] = {}
+    for key in _BY_NAME:
+        counts: Counter[str] = Counter()
+        for row in rows:
+            counts.update(row[key])
+        sums[key] = dict(counts.most_common())
+    for key in next(iter(rows), {}).keys() - {*_BY_NAME, "flux_lm"}:
+        sums[key] = sum(row[key] for row in rows)
+    known = [row["flux_lm"] for row in rows if row["flux_lm"] is not None]
+    return sums | {"flux_lm": float(sum(known)) if known else None}
+
+
+def _codes(rows: Sequence[Converted]) -> list[dict[str, Any]]:
+    """Listed findings by kind and code, those in most files first."""
+    counts: Counter[tuple[str, str]] = Counter()
+    files: Counter[tuple[str, str]] = Counter()
+    for row in rows:
+        here = Counter((f["kind"], f["code"]) for f in row.document["findings"])
+        counts.update(here)
+        files.update(here.keys())
+    order = sorted(files, key=lambda key: (-files[key], -counts[key], key))
+    return [
+        {"kind": k, "code": c, "findings": counts[k, c], "files": files[k, c]} for k, c in order
+    ]
+
+
+def _fix_first(rows: Sequence[Converted]) -> list[dict[str, Any]]:
+    """Entries that the same words mend are one; its impact is the sum over the files' shares."""
+    fixes: dict[tuple[str, str], _Fix] = defaultdict(_Fix)
+    for row in rows:
+        for entry in row.document["fix_first"]:
+            fix = fixes[entry["where"], entry["write"] or entry["what"]]
+            fix.impact += entry["impact"] / len(rows)
+            fix.most = max(fix.most, entry, key=lambda e: float(e["impact"]))
+            if str(row.source) not in fix.files:
+                fix.files.append(str(row.source))
+    order = sorted(fixes.values(), key=lambda fix: -fix.impact)[:MOST]
+    return [
+        {
+            **fix.most,
+            "rank": rank,
+            "impact": round(fix.impact, 4),
+            "files": len(fix.files),
+            "for_example": fix.files[:_NAMED],
+        }
+        for rank, fix in enumerate(order, start=1)
+    ]

@@ -1,0 +1,197 @@
+"""A folder of databases becomes a folder of stages: ``hdrusd convert SOURCE... OUTPUT``."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command_line import HDRUSD, CommandLine, process
+from report_schema import batch_problems
+
+#: An OBJ whose one triangle has an area of 0.5 m2.
+_TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl paint\nf 1 2 3\n"
+
+
+def _lamp(path: Path, name: str, candela: float) -> Path:
+    """A glTF file that holds one point light and a camera to see by."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    light = {"type": "point", "name": name, "intensity": candela}
+    node = {"name": name, "extensions": {"KHR_lights_punctual": {"light": 0}}}
+    document: dict[str, Any] = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [node],
+        "extensions": {"KHR_lights_punctual": {"lights": [light]}},
+    }
+    path.write_text(json.dumps(document))
+    return path
+
+
+@pytest.fixture
+def town(tmp_path: Path) -> Path:
+    """Two lamps, in folders of their own, and what cannot be read."""
+    _lamp(tmp_path / "town/north/head.gltf", "Head", 1000.0)
+    _lamp(tmp_path / "town/south/globe.gltf", "Globe", 250.0)
+    (tmp_path / "town/south/broken.obj").write_text("f 1 2 3\n")
+    return tmp_path / "town"
+
+
+def test_each_file_becomes_the_stage_that_it_becomes_alone(town: Path, tmp_path: Path) -> None:
+    done = process("convert", town, tmp_path / "out", "--jobs", 2)
+    assert done.code == 3
+    out = tmp_path / "out"
+    assert sorted(path.relative_to(out).as_posix() for path in out.rglob("*")) == [
+        "north",
+        "north/head.geometry.usdc",
+        "north/head.look.usda",
+        "north/head.photometry.usda",
+        "north/head.usda",
+        "south",
+        "south/globe.geometry.usdc",
+        "south/globe.look.usda",
+        "south/globe.photometry.usda",
+        "south/globe.usda",
+    ]
+    assert [line.split(":")[0] for line in done.out.splitlines()] == [
+        str(out / "north/head.usda"),
+        str(out / "south/globe.usda"),
+    ]
+    refusals = [line for line in done.err.splitlines() if line.startswith(f"{town}")]
+    assert [line.split(":")[0] for line in refusals] == [str(town / "south/broken.obj")]
+    alone = process("convert", town / "north/head.gltf", tmp_path / "alone/head.usda", "--quiet")
+    assert alone.code == 0
+    for layer in ("head.usda", "head.photometry.usda", "head.look.usda"):
+        assert (out / "north" / layer).read_bytes() == (tmp_path / "alone" / layer).read_bytes()
+
+
+def test_the_report_sums_up(town: Path, tmp_path: Path, cli: CommandLine) -> None:
+    report = tmp_path / "all.json"
+    said = cli.run("convert", town, tmp_path / "out", "--report", report, "--json", code=3)
+    document = json.loads(report.read_text())
+    assert json.loads(said.out) == document
+    assert batch_problems(document) == []
+    assert document["totals"]["files"] == 3
+    assert document["totals"]["converted"] == 2
+    assert document["totals"]["lamps"] == 2
+    # 1000 cd and 250 cd to all sides: 4 pi (1000 + 250) lm.
+    assert document["totals"]["flux_lm"] == pytest.approx(15707.963, rel=1e-6)
+    rows = {Path(row["source"]).name: row for row in document["files"]}
+    assert rows["broken.obj"]["code"] == 3
+    assert rows["broken.obj"]["output"] is None
+    assert "broken.obj" in rows["broken.obj"]["error"]
+    assert rows["head.gltf"]["report"]["lights"][0]["value"] == pytest.approx(1000.0, rel=1e-6)
+    assert "2 of 3 files converted" in said.err
+
+
+def test_a_shared_recipe_speaks_of_all_files_together(town: Path, tmp_path: Path) -> None:
+    (town / "photometry.toml").write_text(
+        '[[light]]\nmatch = "Head*"\ncandela = 40\n'
+        '[[light]]\nmatch = "Globe*"\ncandela = 5\n'
+        '[[light]]\nmatch = "Lantern*"\ncandela = 1\n'
+    )
+    report = tmp_path / "all.json"
+    assert process("convert", town, tmp_path / "out", "--report", report).code == 3
+    document = json.loads(report.read_text())
+    values = [row["report"]["lights"][0]["value"] for row in document["files"] if not row["code"]]
+    assert values == [40.0, 5.0]
+    assert [entry["pattern"] for entry in document["unused_patterns"]] == ["Lantern*"]
+    assert "sidecar-no-match" not in {entry["code"] for entry in document["findings_by_code"]}
+
+
+def test_a_recipe_of_one_file_alone_is_as_strict_as_ever(town: Path, tmp_path: Path) -> None:
+    (town / "north/photometry.toml").write_text('[[light]]\nmatch = "Lantern*"\ncandela = 1\n')
+    report = tmp_path / "all.json"
+    process("convert", town, tmp_path / "out", "--report", report)
+    document = json.loads(report.read_text())
+    codes = {entry["code"]: entry["files"] for entry in document["findings_by_code"]}
+    assert codes["sidecar-no-match"] == 1
+    assert document["unused_patterns"] == []
+
+
+def test_what_is_mended_by_one_line_is_one_entry(tmp_path: Path) -> None:
+    for name in ("a", "b", "c"):
+        (tmp_path / f"{name}.obj").write_text(_TRIANGLE)
+    report = tmp_path / "all.json"
+    sources = [tmp_path / f"{name}.obj" for name in ("a", "b", "c")]
+    assert process("convert", *sources, tmp_path / "out", "--report", report).code == 0
+    document = json.loads(report.read_text())
+    dark = document["fix_first"][0]
+    assert (dark["rank"], dark["files"]) == (1, 3)
+    assert dark["for_example"] == [str(source) for source in sources]
+    assert dark["impact"] == pytest.approx(3.0)  # of each file, so of their mean too
+
+
+def test_a_file_that_kills_its_process_is_one_line(tmp_path: Path) -> None:
+    for name in ("before", "deadly", "later", "last"):
+        (tmp_path / f"{name}.obj").write_text(_TRIANGLE)
+    plugin = tmp_path / "python"
+    plugin.mkdir()
+    (plugin / "sitecustomize.py").write_text(
+        "import os, hdrusd.importers.importer as importer\n"
+        "read = importer.read\n"
+        "def deadly(resolver, report):\n"
+        "    if resolver.source.name == 'deadly.obj':\n"
+        "        os.abort()\n"
+        "    return read(resolver, report)\n"
+        "importer.read = deadly\n"
+    )
+    done = process("convert", tmp_path, tmp_path / "out", "--jobs", 1, PYTHONPATH=str(plugin))
+    assert done.code == 3
+    assert f"{tmp_path}/deadly.obj: the process that read it was ended by SIGABRT" in done.err
+    stages = sorted(path.name for path in (tmp_path / "out").glob("*.usda") if "." not in path.stem)
+    assert stages == ["before.usda", "last.usda", "later.usda"]
+
+
+@pytest.mark.parametrize("whole_group", [True, False])
+def test_an_interrupt_leaves_whole_stages_only(tmp_path: Path, whole_group: bool) -> None:
+    for number in range(400):
+        (tmp_path / f"{number:03}.obj").write_text(_TRIANGLE)
+    out = tmp_path / "out"
+    job = subprocess.Popen(
+        [*HDRUSD, "convert", str(tmp_path), str(out), "--jobs", "2"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # Who starts the tests in the background hands down an ignored SIGINT.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    deadline = time.monotonic() + 120.0
+    while not (out / "001.usda").exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    (os.killpg if whole_group else os.kill)(job.pid, signal.SIGINT)
+    _, err = job.communicate(timeout=60)
+    assert job.returncode == 130, err
+    assert err.strip() == "interrupted"
+    assert not list(out.glob(".*"))
+    stages = {path.stem for path in out.glob("*.usda") if "." not in path.stem}
+    assert "001" in stages
+    assert "399" not in stages
+    for stem in stages:
+        assert (out / f"{stem}.photometry.usda").exists()
+        assert (out / f"{stem}.geometry.usdc").exists()
+
+
+def test_wrong_use(town: Path, tmp_path: Path, cli: CommandLine) -> None:
+    one = town / "north/head.gltf"
+    line = cli.refused("convert", town, tmp_path / "out.usda", code=2)
+    assert "want a folder" in line
+    assert "want several sources" in cli.refused(
+        "convert", one, tmp_path / "out.usda", "--jobs", 2, code=2
+    )
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    assert "no database in it" in cli.refused("convert", empty, tmp_path / "out", code=3)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.fixture
+def cli(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> CommandLine:
+    """The command line in this process; its workers are processes of their own all the same."""
+    return CommandLine(monkeypatch, capsys, None)

@@ -1,0 +1,93 @@
+"""Which files of a folder are converted, to which stages, by which photometry file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hdrusd.batch.plan import plan
+from hdrusd.errors import InputError
+
+
+def _touch(*paths: Path) -> None:
+    for path in paths:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+
+
+def _stages(folder: Path, *sources: Path) -> dict[str, str]:
+    """Sources to stages, both relative."""
+    tasks = plan(sources or [folder], folder / "out")
+    return {
+        str(task.source.relative_to(folder)): str(task.output.relative_to(folder / "out"))
+        for task in tasks
+    }
+
+
+def test_the_tree_is_kept_and_other_files_are_none(tmp_path: Path) -> None:
+    _touch(tmp_path / "a.flt", tmp_path / "deep/er/B.OBJ", tmp_path / "deep/b.mtl")
+    _touch(tmp_path / "deep/picture.png", tmp_path / "s.usda")
+    assert _stages(tmp_path) == {
+        "a.flt": "a.usda",
+        "deep/er/B.OBJ": "deep/er/B.usda",
+        "s.usda": "s.usda",
+    }
+
+
+def test_two_sources_of_one_name_keep_their_suffix(tmp_path: Path) -> None:
+    _touch(tmp_path / "lamp.3ds", tmp_path / "Lamp.obj", tmp_path / "post.flt")
+    assert _stages(tmp_path) == {
+        "Lamp.obj": "Lamp_obj.usda",
+        "lamp.3ds": "lamp_3ds.usda",
+        "post.flt": "post.usda",
+    }
+
+
+def test_no_stage_is_called_like_a_layer_of_another(tmp_path: Path) -> None:
+    _touch(tmp_path / "lamp.flt", tmp_path / "lamp.look.obj")
+    assert _stages(tmp_path) == {"lamp.flt": "lamp.usda", "lamp.look.obj": "lamp_look_obj.usda"}
+
+
+def test_hidden_files_the_output_and_links_out_are_passed_over(tmp_path: Path) -> None:
+    folder, other = tmp_path / "folder", tmp_path / "other"
+    _touch(folder / "a.flt", folder / ".b.flt", folder / ".git/c.flt", folder / "out/d.usda")
+    _touch(other / "e.flt")
+    (folder / "link.flt").symlink_to(other / "e.flt")
+    (folder / "linked").symlink_to(other)
+    assert _stages(folder) == {"a.flt": "a.usda"}
+
+
+def test_named_files_keep_the_tree_below_their_common_folder(tmp_path: Path) -> None:
+    named = [tmp_path / "cars/red/asset.usda", tmp_path / "cars/blue/asset.usda"]
+    _touch(*named, tmp_path / "cars/blue/geo.usda")
+    assert _stages(tmp_path, *named) == {
+        "cars/red/asset.usda": "red/asset.usda",
+        "cars/blue/asset.usda": "blue/asset.usda",
+    }
+
+
+def test_a_file_that_is_named_twice_is_converted_once(tmp_path: Path) -> None:
+    _touch(tmp_path / "a/b.flt")
+    tasks = plan([tmp_path / "a", tmp_path / "a/b.flt"], tmp_path / "out")
+    assert [task.source for task in tasks] == [tmp_path / "a/b.flt"]
+
+
+def test_the_nearest_photometry_file_counts(tmp_path: Path) -> None:
+    folder = tmp_path / "folder"
+    _touch(tmp_path / "photometry.toml", folder / "photometry.toml", folder / "a.flt")
+    _touch(folder / "b/b.flt", folder / "c/photometry.toml", folder / "c/d/d.flt")
+    tasks = {task.source.name: task for task in plan([folder], tmp_path / "out")}
+    own, near = folder / "photometry.toml", folder / "c/photometry.toml"
+    assert [tasks[n].photometry for n in ("a.flt", "b.flt", "d.flt")] == [own, own, near]
+    assert [tasks[n].shared for n in ("a.flt", "b.flt", "d.flt")] == [True, True, False]
+    (folder / "photometry.toml").unlink()
+    assert plan([folder / "b"], tmp_path / "out")[0].photometry is None  # not above the folder
+    given = tmp_path / "photometry.toml"
+    assert {task.photometry for task in plan([folder], tmp_path / "out", given)} == {given}
+
+
+def test_a_folder_without_a_database_is_refused(tmp_path: Path) -> None:
+    _touch(tmp_path / "readme.txt")
+    with pytest.raises(InputError, match="no database in it"):
+        plan([tmp_path], tmp_path / "out")
