@@ -9,6 +9,7 @@ from pathlib import Path, PurePosixPath
 from typing import Protocol
 
 from hdrusd.errors import InputError, SourceRef
+from hdrusd.importers.cycle_search import put_off
 from hdrusd.importers.unplaced import note_unplaced
 from hdrusd.legacy.scene import LegacyScene
 from hdrusd.registry import Registry
@@ -184,7 +185,8 @@ SUFFIXES = {
 
 def read(resolver: Resolver, report: Report) -> LegacyScene:
     """Read a legacy file by its suffix. Raises InputError."""
-    scene = read_part(resolver, report)
+    with put_off():
+        scene = read_part(resolver, report)
     note_unplaced(scene, report)
     return scene
 

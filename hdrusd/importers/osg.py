@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from hdrusd.errors import InputError, SourceRef
-from hdrusd.importers.cycle_search import put_off
 from hdrusd.importers.expansion import check_expansion
 from hdrusd.importers.importer import Resolver
 from hdrusd.importers.osg_files import File, Files, load
@@ -32,8 +31,7 @@ from hdrusd.report import Kind, Report
 
 def read(resolver: Resolver, report: Report) -> LegacyScene:
     """Read ``resolver.source``. Raises InputError when nothing can be used."""
-    with put_off():
-        return _SceneReader(resolver, report).read()
+    return _SceneReader(resolver, report).read()
 
 
 @dataclass(slots=True)
