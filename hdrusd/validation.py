@@ -163,14 +163,11 @@ _AREA_KINDS = frozenset({"sphere", "disk", "rect", "cylinder"})
 @_task
 def check_light(prim: Usd.Prim, span: UsdValidation.ValidationTimeRange) -> Iterator[_Fault]:
     """A light's numbers are sound, and say the same in UsdLux and in photometric units."""
-    authored = {attribute.GetName() for attribute in prim.GetAuthoredAttributes()}
-    stated = [name for name in _LIGHT_NUMBERS if f"inputs:{name}" in authored]
-    sources = {name: lux.input_source(prim, name) for name in stated}
-    broken = [
-        fault
-        for name, source in sources.items()
-        for fault in _bad_numbers(source, f"inputs:{name}", span, _LIGHT_NUMBERS[name])
-    ]
+    told = {attribute.GetName() for attribute in prim.GetAuthoredAttributes()}
+    sources = {n: lux.input_source(prim, n) for n in _LIGHT_NUMBERS if f"inputs:{n}" in told}
+    broken: list[_Fault] = []
+    for name, source in sources.items():
+        broken += _bad_numbers(source, f"inputs:{name}", span, _LIGHT_NUMBERS[name])
     yield from broken
     kind = lux.light_kind(prim)
     world = None
@@ -180,10 +177,8 @@ def check_light(prim: Usd.Prim, span: UsdValidation.ValidationTimeRange) -> Iter
     wrong = "illuminance" if kind in _AREA_KINDS else "luminousIntensity"
     if kind != "other" and _authored(prim, f"inputs:photometric:{wrong}"):
         right = "luminousIntensity (cd)" if kind in _AREA_KINDS else "illuminance (lx)"
-        yield _Fault(
-            "WrongQuantity",
-            f"inputs:photometric:{wrong} has no meaning on a {kind} light; want {right}",
-        )
+        text = f"inputs:photometric:{wrong} has no meaning on a {kind} light; want {right}"
+        yield _Fault("WrongQuantity", text)
     if kind in _AREA_KINDS and lux.photometric_file(prim):
         if _authored(prim, "inputs:photometric:luminousIntensity"):
             text = "luminousIntensity beside a photometric file, whose candela count; want one"
@@ -216,18 +211,15 @@ def _ambiguous_size(prim: Usd.Prim, kind: str, world: Gf.Matrix4d) -> Iterator[_
 
 
 def _disagreement(
-    prim: Usd.Prim, first: Gf.Matrix4d | None, times: list[Usd.TimeCode]
+    prim: Usd.Prim, earliest_world: Gf.Matrix4d | None, times: list[Usd.TimeCode]
 ) -> Iterator[_Fault]:
-    """The plain UsdLux reading against the photometric value, once, at the first such time.
-
-    ``first``: local to world at the earliest time, of a light with a place.
-    """
-    name, unit = ("illuminance", "lx") if first is None else ("luminousIntensity", "cd")
+    """The plain UsdLux reading against the photometric value, once, at the first such time."""
+    name, unit = ("illuminance", "lx") if earliest_world is None else ("luminousIntensity", "cd")
     if not _authored(prim, f"inputs:photometric:{name}"):
         return
     source = lux.input_source(prim, f"photometric:{name}")
     for time in times:
-        world = first if time.IsEarliestTime() else None
+        world = earliest_world if time.IsEarliestTime() else None
         said, reading = source.Get(time), lux.read_lux(prim, time, world=world)
         if said is None or reading is None:
             continue

@@ -290,4 +290,3 @@ def keep_extras(prim: Usd.Prim, extras: Mapping[str, Any]) -> None:
 def bind(prim: Usd.Prim, material: Sdf.Path) -> None:
     """Bind a material by path; its prim may stand in another layer."""
     UsdShade.MaterialBindingAPI.Apply(prim).GetDirectBindingRel().SetTargets([material])
-
