@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+import tempfile
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from functools import partial
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from hdrusd.errors import HdrusdError, InputError
+from hdrusd.errors import HdrusdError, InputError, one_line
 from hdrusd.photometry.estimate import DEFAULT_RULE, RULES
 
 from .options import (
@@ -123,6 +124,8 @@ def command(
     if jobs is not None:
         raise click.UsageError("--jobs: want several sources, or a folder")
     if output.suffix.lower() not in OUTPUT_SUFFIXES:
+        if not sources[0].exists():  # a folder by a wrong name may be meant
+            raise InputError(sources[0], "no such file or folder")
         raise click.UsageError(f"{output}: want a name that ends in {' or '.join(OUTPUT_SUFFIXES)}")
     _convert_one(sources[0], output, options, telling)
 
@@ -175,8 +178,19 @@ def _convert_many(
     from hdrusd.batch.plan import plan
     from hdrusd.batch.workers import convert_all
     from hdrusd.map_threads import CORES
+    from hdrusd.photometry.sidecar import read_sidecar
+    from hdrusd.report import Report
 
-    tasks = plan(sources, output, options.photometry)
+    RULES[options.estimate]  # what is wrong of all files is said once, and at once
+    if options.photometry is not None:
+        read_sidecar(options.photometry, Report())
+
+    def passed_over(line: str) -> None:
+        if not telling.quiet:
+            click.echo(line, err=True)
+
+    tasks = plan(sources, output, options.photometry, passed_over)
+    _check_writable(output)
     rows = []
     with closing(convert_all(tasks, options, jobs or CORES)) as run:
         for row in run:
@@ -195,10 +209,23 @@ def _convert_many(
         sys.exit(STRICT)
 
 
+def _check_writable(output: Path) -> None:
+    """Said once before the work, and not of every file after it."""
+    home = output.absolute()
+    above = next(folder for folder in (home, *home.parents) if folder.exists())
+    try:
+        with tempfile.TemporaryFile(dir=above):
+            pass
+    except OSError as problem:
+        text = f"{output}: nothing can be written in {above} ({problem.strerror})"
+        raise HdrusdError(text) from problem
+
+
 def _refusal(source: Path, error: str) -> str:
     """With the whole path: many folders may have a file of that name."""
-    name = source.name
-    return f"{source}{error.removeprefix(name)}" if error.startswith(name) else f"{source}: {error}"
+    name = one_line(source.name)  # as errors have it
+    rest = error.removeprefix(name) if error.startswith(name) else f": {error}"
+    return f"{one_line(str(source))}{rest}"
 
 
 def _line(output: Path, document: Mapping[str, Any]) -> str:

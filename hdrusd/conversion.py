@@ -47,6 +47,7 @@ class Result:
     unit_stated: bool = False  # by whoever asked for the conversion
     source: Path | None = None
     unmatched: list[Unmatched] = field(default_factory=list)
+    parts: set[Path] = field(default_factory=set)  # the files that it is made of, real paths
 
     def note_unmatched(self, sidecar: Sidecar, options: Options) -> None:
         """What of the photometry file fits nothing: for the report, or for whoever shares it."""

@@ -80,8 +80,10 @@ class _Conversion:
         self.sidecar = _find_sidecar(source, options, report)
         resolver = Resolver(source, report, options.roots, options.search, options.limits)
         self.scene = read_legacy(resolver, report)
-        self.result = Result(output, report, self.scene.counts(), source=source)
-        up = options.up or self.scene.up
+        self.result = Result(
+            output, report, self.scene.counts(), source=source, parts=resolver.found
+        )
+        up = options.up or self.sidecar.up or self.scene.up
         self.added = add_lamps(self.scene, self.sidecar, up, report)
         stem = output.stem
         files = folder / f"{stem}.textures", f"./{stem}.textures"
@@ -97,7 +99,7 @@ class _Conversion:
             self.scene,
             report,
             meters_per_unit=options.meters_per_unit,
-            source_unit=options.source_unit or self.scene.unit_m,
+            source_unit=options.source_unit or self.sidecar.unit_m or self.scene.unit_m,
             up=up,
         )
         self.surfaces: list[Surface] = []
@@ -227,7 +229,7 @@ class _Conversion:
         result, stage = self.result, self.writer.stage
         result.textures = self.maps.written | self.luminaires.written | self.skies.written
         result.diagonal, result.ground = extents(stage)
-        result.unit_stated = self.options.source_unit is not None
+        result.unit_stated = bool(self.options.source_unit or self.sidecar.unit_m)
         scales = area_scales(stage, self.writer.meshes, self.writer.tree.copies)
         judge = Reflectances(self.maps.overview, self.report)
         pairs = zip(self.scene.materials, self.surfaces, result.materials, strict=True)

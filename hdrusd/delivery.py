@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import errno
+import fcntl
+import os
 import unicodedata
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from hdrusd.errors import InputError, OutputError
@@ -109,8 +111,25 @@ def _refused(output: Path, problem: OSError) -> OSError:
 def move_into_place(folder: Path, output: Path) -> None:
     """Rename what was made; the root layer last, so that it never names what is not there.
 
-    What stood there before is set aside, and put back when a rename fails.
+    What stood there before is set aside, and put back when a rename fails. Of two runs at once
+    one waits for the other, or parts of both would stand there.
     """
+    with _turn(output.parent):
+        _rename_all(folder, output)
+
+
+@contextmanager
+def _turn(folder: Path) -> Iterator[None]:
+    """No other process renames into a folder meanwhile; the kernel forgets the dead."""
+    with ExitStack() as held:
+        with suppress(OSError):  # it may not be listed, or its file system locks no folders
+            handle = os.open(folder, os.O_RDONLY)
+            held.callback(os.close, handle)
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+
+
+def _rename_all(folder: Path, output: Path) -> None:
     names = sorted((p.name for p in folder.iterdir()), key=lambda name: name == output.name)
     old = folder / _ASIDE
     old.mkdir()

@@ -118,6 +118,15 @@ class MapWriter:
             self._data[key] = made.file
         return Map(self._data[key], texture, raw=True)
 
+    def grey(self, image: Image) -> bool:
+        """Whether a picture has one value in every texel, and no colours."""
+        key = self._key(image)
+        picture = None if key is None else self._read(image, key)
+        if picture is None:
+            return False
+        red, *others = np.moveaxis(picture.pixels, -1, 0)[:3]
+        return len(others) < 2 or all(np.array_equal(red, other) for other in others)
+
     def reflectance(
         self, texture: Texture, diffuse: RGB, gamma: float, place: SourceRef, thing: str
     ) -> Map | None:
@@ -167,6 +176,7 @@ class MapWriter:
         picture = None if key is None else self._read(texture.image, key)
         if key is None or picture is None:
             return None
+        gamma = 1.0 if texture.linear else gamma
         weights = _weights(emission)
         hue = tuple(np.round(weights, 9).tolist()) if peak else ()
         name = _name(texture.image, "L", f"{key}|{gamma!r}|{peak}|{hue}")
@@ -204,7 +214,7 @@ class MapWriter:
         picture = None if key is None else self._read(texture.image, key)
         if picture is None:
             return None
-        values = linear(picture, gamma) @ _weights(emission)
+        values = linear(picture, 1.0 if texture.linear else gamma) @ _weights(emission)
         top = float(values.max(initial=0.0))
         return np.clip(values / top if peak and top > 0.0 else values, 0.0, _HALF_MAX)
 

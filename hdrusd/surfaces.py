@@ -88,7 +88,8 @@ class SurfaceMaker:
             roughness = roughness_from_shininess(shininess)
         pbr = dict(material.pbr or {"glossiness": 0.0})
         if specular is not None and "glossiness" not in pbr:
-            pbr = {"glossiness": 1.0 - pbr.get("roughness", 1.0)}
+            coat = {name: value for name, value in pbr.items() if name.startswith("clearcoat")}
+            pbr = {"glossiness": 1.0 - pbr.get("roughness", 1.0), **coat}
         if roughness is not None and "glossiness" in pbr:
             pbr["glossiness"] = 1.0 - roughness
         elif roughness is not None:
@@ -270,6 +271,11 @@ class SurfaceMaker:
     def _data(self, material: Material) -> dict[str, Map]:
         """Maps whose texels are data, by what they give; copies that are read raw."""
         maps = material.maps()
+        normal = maps.get("normal_map")
+        if normal is not None and self.maps.grey(normal.image):
+            text = f"{normal.image.name} is grey, so heights and no directions; left out"
+            self._note(material, Kind.DROPPED, "normal-grey", text)
+            del maps["normal_map"]
         made = {name: self.maps.data(maps[name]) for name in DATA_MAPS if name in maps}
         return {name.removesuffix("_map"): used for name, used in made.items() if used is not None}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,39 @@ def test_hidden_files_the_output_and_links_out_are_passed_over(tmp_path: Path) -
     (folder / "link.flt").symlink_to(other / "e.flt")
     (folder / "linked").symlink_to(other)
     assert _stages(folder) == {"a.flt": "a.usda"}
+    said: list[str] = []
+    plan([folder], folder / "out", tell=said.append)
+    assert said == [
+        f"{folder}: passed over, links to folders: 1 (linked)",
+        f"{folder}: passed over, links that lead out of it: 1 (link.flt)",
+    ]
+
+
+def test_what_earlier_conversions_wrote_is_passed_over(tmp_path: Path) -> None:
+    mark = '#usda 1.0\nover "a" {\n uniform string authorship:hdrusd:softwarePackage = "hdrusd"\n}'
+    _touch(tmp_path / "a.flt", tmp_path / "old/a.usda", tmp_path / "old/a.geometry.usdc")
+    _touch(tmp_path / "old/a.look.usda", tmp_path / "old/a.usdz")
+    (tmp_path / "old/a.photometry.usda").write_text(mark)
+    _touch(tmp_path / "c.usda")
+    os.mkfifo(tmp_path / "c.photometry.usda")  # nobody writes into it
+    # Layers of those names that somebody else wrote are a database like others.
+    _touch(tmp_path / "b.usda", tmp_path / "b.photometry.usda")
+    said: list[str] = []
+    tasks = plan([tmp_path], tmp_path / "out", tell=said.append)
+    assert [str(task.source.relative_to(tmp_path)) for task in tasks] == [
+        "a.flt",
+        "b.photometry.usda",
+        "b.usda",
+        "c.photometry.usda",
+        "c.usda",
+        "old/a.usdz",
+    ]
+    assert said == [
+        f"{tmp_path}: passed over, stages and layers that hdrusd wrote: 4 "
+        "(old/a.geometry.usdc, old/a.look.usda, old/a.photometry.usda, ...)"
+    ]
+    named = tmp_path / "old/a.usda"  # who names one means it
+    assert [task.source for task in plan([named], tmp_path / "out")] == [named]
 
 
 def test_named_files_keep_the_tree_below_their_common_folder(tmp_path: Path) -> None:

@@ -310,14 +310,39 @@ def test_a_missing_picture_leaves_the_numbers(gl: Any, tmp_path: Path) -> None:
 
 
 def test_what_the_photometry_file_states_takes_the_maps_place(tmp_path: Path) -> None:
-    sidecar(tmp_path, '[[material]]\nmatch = "paint"\nroughness = 0.25\nspecular = 0.1\n')
+    stated = "roughness = 0.25\nspecular = [0.1, 0.1, 0.1]"
+    sidecar(tmp_path, f'[[material]]\nmatch = "paint"\n{stated}\n')
     png(tmp_path / "p.png")
     source = pbr(metallicRoughnessTexture={"index": 0})
     result = run(square(tmp_path, source, normalTexture={"index": 0}, picture="p.png"))
     shader = surface(opened(result))
     assert texture_node(shader, "roughness") is None
     assert shader.GetInput("roughness").Get() == 0.25
+    assert tuple(shader.GetInput("specularColor").Get()) == pytest.approx((0.1,) * 3)
+    assert not shader.GetInput("metallic")
     assert texture_node(shader, "normal") is not None
+
+
+def test_a_coat_stays_over_a_stated_specular_reflectance(tmp_path: Path) -> None:
+    sidecar(tmp_path, '[[material]]\nmatch = "paint"\nspecular = [0.1, 0.1, 0.1]\n')
+    png(tmp_path / "p.png")
+    coat = {"clearcoatFactor": 0.5, "clearcoatTexture": {"index": 0}}
+    source = pbr() | {"extensions": {"KHR_materials_clearcoat": coat}}
+    shader = surface(opened(run(square(tmp_path, source, picture="p.png"))))
+    assert shader.GetInput("useSpecularWorkflow").Get() == 1
+    assert shader.GetInput("clearcoat").Get() == 0.5
+    assert texture_file(shader, "clearcoat").is_file()
+
+
+@pytest.mark.parametrize("channels", [1, 2, 3, 4])
+def test_heights_in_the_place_of_normals_are_left_out(tmp_path: Path, channels: int) -> None:
+    heights = np.tile(np.arange(0, 256, 16, dtype=np.uint8).reshape(4, 4, 1), (1, 1, channels))
+    png(tmp_path / "n.png", heights)
+    result = run(square(tmp_path, matt(0.5), normalTexture={"index": 0}, picture="n.png"))
+    assert not surface(opened(result)).GetInput("normal")
+    assert findings(result, "normal-grey") == [
+        "n.png is grey, so heights and no directions; left out"
+    ]
 
 
 def test_a_lamp_has_no_maps(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from pxr import Sdf, Usd, UsdShade, UsdUtils
 
 from hdrusd.conversion import Result
 from hdrusd.images import read_exr, write_exr
+from hdrusd.units import LUMINANCE_WEIGHTS
 
 WALL = "asset inputs:file = @wall.png@"
 
@@ -155,6 +156,59 @@ def test_a_lamp_s_picture_shows_its_luminance(tmp_path: Path) -> None:
     made = node(surface(result), "emissiveColor")
     assert texels(surface(result), "emissiveColor") == close((1.0, 1.0, 1.0))  # its peak is white
     assert tuple(made.GetInput("scale").Get())[:3] == pytest.approx((5000.0,) * 3, rel=1e-6)
+
+
+#: What feeds a lamp's emission, and the coat over it.
+GLOW = """color3f inputs:emissiveColor.connect = </World/paint/E.outputs:rgb>
+        float inputs:clearcoat.connect = </World/paint/E.outputs:r>"""
+PICTURE = """
+    def Shader "E"
+    {{
+        uniform token info:id = "UsdUVTexture"
+        asset inputs:file = @{}@
+        token inputs:sourceColorSpace = "{}"
+        float3 outputs:rgb
+        float outputs:r
+    }}"""
+
+
+@pytest.mark.parametrize(
+    ("file", "space", "gamma"),
+    [("wall.png", "sRGB", 2.2), ("wall.png", "raw", 1.0), ("wall.exr", "auto", 1.0)],
+)
+@pytest.mark.parametrize(
+    ("stated", "mean"),  # cd/m2 over all of the lamp
+    [
+        ("luminance = 500", None),
+        ("candela = 10\narea = 0.25", 40.0),
+        ("lumens = 10\narea = 0.25", 40.0 / np.pi),
+    ],
+)
+def test_a_lamp_keeps_its_picture_of_emission(
+    tmp_path: Path, file: str, space: str, gamma: float, stated: str, mean: float | None
+) -> None:
+    """Codes for a screen by T^2.2, values as they are; I / A is the mean over the picture."""
+    write_exr(tmp_path / "wall.exr", CODES / np.float32(255.0), luminance=False)
+    toml = f'[[material]]\nmatch = "paint"\n{stated}\n'
+    made = paint("/World/paint", surface=GLOW, extra=PICTURE.format(file, space))
+    shader = surface(convert(tmp_path, made, toml=toml))
+    linear = (CODES / 255.0) ** gamma
+    assert texels(shader, "emissiveColor") == pytest.approx(linear, rel=2**-11, abs=2**-25)
+    wanted = 500.0 if mean is None else mean / float((linear @ LUMINANCE_WEIGHTS).mean())
+    scale = node(shader, "emissiveColor").GetInput("scale").Get()
+    assert tuple(scale)[:3] == pytest.approx((wanted,) * 3, rel=1e-6)
+    assert not shader.GetInput("diffuseColor")  # not made black
+    assert shader.GetInput("clearcoat").GetConnectedSources()[0]
+
+
+def test_a_lamp_s_glass_has_no_coat(tmp_path: Path) -> None:
+    coat = "float inputs:clearcoat.connect = </World/paint/E.outputs:r>"
+    made = paint("/World/paint", surface=coat, extra=PICTURE.format("wall.png", "raw"))
+    toml = '[[material]]\nmatch = "paint"\nluminance = 500\n'
+    shader = surface(convert(tmp_path, made, toml=toml))
+    assert tuple(shader.GetInput("diffuseColor").Get()) == (0.0, 0.0, 0.0)
+    assert shader.GetInput("clearcoat").Get() == 0.0
+    assert not shader.GetInput("clearcoat").GetConnectedSources()[0]
 
 
 def test_a_stated_gloss(tmp_path: Path) -> None:

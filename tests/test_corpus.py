@@ -39,6 +39,7 @@ REAL = (
 BY_OTHERS = (
     ("assimp/AC/SphereWithLight.ac", find_library() is not None),
     ("derived-osg/night_street.ive", shutil.which("osgconv") is not None),
+    ("gltf-transform/extensions/test/in/BoxMeshopt.glb", find_spec("meshopt") is not None),
     ("osgearth/data/streetlight.osgb", shutil.which("osgconv") is not None),
     ("ufbx/maya_material_chart_7700_binary.fbx", find_spec("ufbx") is not None),
 )

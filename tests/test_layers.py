@@ -47,6 +47,8 @@ THIRD_PARTY = {
     "matplotlib": {"adaptation_log", "candela_plot", "plots"},
     "click": {"cli"},
     "ufbx": {"importers"},  # in a worker process only: tests/importers/test_fbx.py
+    "DracoPy": {"importers"},  # so too: tests/importers/test_gltf_draco.py
+    "meshopt": {"importers"},  # and: tests/importers/test_gltf_meshopt.py
     "numpy": set().union(*LAYERS),
 }
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,7 +19,7 @@ from builders import obj
 
 from hdrusd.conversion import Options
 from hdrusd.convert import convert
-from hdrusd.delivery import work_folder
+from hdrusd.delivery import move_into_place, work_folder
 from hdrusd.errors import InputError
 from hdrusd.images import write_exr
 from hdrusd.leftovers import left_behind, private_name
@@ -129,6 +132,23 @@ def test_a_stage_set_aside_stays_until_its_successor_is_there(tmp_path: Path) ->
     assert left.is_dir()  # neither has replaced it
     convert(source, output, Options())
     assert names(output.parent) == PARTS | {p.replace("wall", "other") for p in PARTS}
+
+
+def test_one_at_a_time_renames_into_a_folder(tmp_path: Path) -> None:
+    output = tmp_path / "wall.usda"
+    handle = os.open(tmp_path, os.O_RDONLY)
+    with work_folder(output) as folder:
+        (folder / output.name).write_text("done")
+        move = threading.Thread(target=move_into_place, args=(folder, output))
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        try:
+            move.start()
+            move.join(0.2)
+            assert not output.exists()
+        finally:
+            os.close(handle)
+            move.join()
+        assert output.read_text() == "done"
 
 
 def test_who_works_in_the_same_folder_is_left_alone(tmp_path: Path) -> None:

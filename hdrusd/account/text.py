@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from textwrap import wrap
 from typing import Any
 
+from hdrusd.account.fix_first import COMMAND, PHOTOMETRY, SOURCE
 from hdrusd.account.lights import FACTOR, group_name, grouped
 from hdrusd.errors import one_line
 
@@ -42,8 +43,11 @@ def batch_summary(document: Mapping[str, Any], columns: int) -> list[str]:
         for row in document["findings_by_code"][:CODES]
     ]
     if len(document["findings_by_code"]) > CODES:
-        lines.append(f"  and {len(document['findings_by_code']) - CODES} more codes; {_MORE}")
-    lines += [f"{u['place']}: {u['pattern']}: {u['text']}" for u in document["unused_patterns"]]
+        left = len(document["findings_by_code"]) - CODES
+        lines.append(f"  and {left} more code{'s' if left > 1 else ''}; {_MORE}")
+    for unused in document["unused_patterns"]:
+        said = one_line(f"{unused['place']}: {unused['pattern']}: {unused['text']}")
+        lines += wrap(said, width, subsequent_indent="  ", break_on_hyphens=False)
     if totals["converted"]:
         lines += [_sum_of_lights(totals), *_surfaces(totals)]
         entries = [
@@ -137,7 +141,12 @@ def _fixes(entries: Sequence[Mapping[str, Any]], width: int) -> Iterator[str]:
         if entry["write"]:
             head, _, body = entry["write"].partition("\n")
             told = f"{entry['where']}: {head} {', '.join(body.splitlines())}".rstrip()
-            yield from (f"     {line}" for line in wrap(one_line(told), width - 5)[:2])
+        elif entry["where"] not in (PHOTOMETRY, COMMAND, SOURCE):
+            told = entry["where"]  # which photometry file of a batch
+        else:
+            continue
+        lines = wrap(one_line(told), width - 5, break_on_hyphens=False)[:2]
+        yield from (f"     {line}" for line in lines)
     if len(entries) > ENTRIES:
         yield f"  and {len(entries) - ENTRIES} more; {_MORE}"
 

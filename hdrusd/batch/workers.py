@@ -16,7 +16,7 @@ from types import FrameType
 
 from hdrusd import map_threads
 from hdrusd.account.many import Converted
-from hdrusd.batch.plan import Task
+from hdrusd.batch.plan import DATABASES, Task
 from hdrusd.conversion import Options
 from hdrusd.convert import convert
 from hdrusd.delivery import clear_leftovers
@@ -169,8 +169,10 @@ def _converted(task: Task, options: Options) -> Converted:
         task.source,
         task.output,
         result.as_dict(),
-        photometry=task.photometry if task.shared else None,
+        photometry=task.photometry,
+        shared=task.shared,
         unmatched=result.unmatched,
+        parts={file for file in result.parts if file.suffix.lower() in DATABASES},
     )
 
 

@@ -14,8 +14,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import stat
 import types
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
@@ -29,17 +27,15 @@ import numpy.typing as npt
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.importers.exchange_checks import BrokenSceneError, check_image, check_scene
 from hdrusd.importers.importer import Resolver
+from hdrusd.importers.worker_files import read_arrays, read_json
 from hdrusd.legacy.scene import Image, LegacyScene, Node
 from hdrusd.report import Finding, Kind, Report
 
 SCENE = "scene.json"
 ARRAYS = "arrays.bin"
 
-#: Bytes of JSON that the parent parses; a record of a node takes about 200.
-_JSON_BYTES = 1 << 28
 #: What an array may be made of, as NumPy writes it.
 _DTYPES = {"|u1", "<i4", "<f4", "<f8"}
-_DIMENSIONS = 3
 
 _Array = npt.NDArray[Any]
 
@@ -154,7 +150,7 @@ def load_scene(folder: Path, resolver: Resolver, report: Report) -> LegacyScene:
     only are looked up, with findings. Raises InputError.
     """
     try:
-        record = _json(folder)
+        record = read_json(folder / SCENE)
         if "refusal" in record:
             place, problem = record["refusal"]
             place = place if isinstance(place, int | str) else None
@@ -169,32 +165,6 @@ def load_scene(folder: Path, resolver: Resolver, report: Report) -> LegacyScene:
     except RecursionError as error:
         raise InputError(resolver.source, "its reader answered lists without end") from error
     return scene
-
-
-def _open(path: Path, most: int) -> tuple[int, int]:
-    """A file that the worker left, opened, and its size; a link or a pipe is none."""
-    try:
-        number = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
-    except OSError as error:
-        raise BrokenSceneError(f"{path.name}: {error.strerror}") from None
-    about = os.fstat(number)
-    if not stat.S_ISREG(about.st_mode) or about.st_size > most:
-        os.close(number)
-        raise BrokenSceneError(f"{path.name}: want a file of at most {most} bytes")
-    return number, about.st_size
-
-
-def _json(folder: Path) -> dict[str, Any]:
-    number, _ = _open(folder / SCENE, _JSON_BYTES)
-    with open(number, encoding="utf-8") as stream:
-        found = json.load(stream, parse_constant=_no_number)
-    if not isinstance(found, dict):
-        raise BrokenSceneError("no record of a scene")
-    return found
-
-
-def _no_number(text: str) -> float:
-    raise BrokenSceneError(f"{text} is no number")
 
 
 class _Reader:
@@ -245,21 +215,11 @@ class _Reader:
             report.add(Kind(entry["kind"]), texts[0], source, texts[1], texts[2])
 
     def _read_arrays(self, folder: Path) -> None:
-        kinds = []
-        for dtype, shape in self.record["arrays"]:
-            sizes = isinstance(shape, list) and all(type(n) is int and n >= 0 for n in shape)
-            if dtype not in _DTYPES or not sizes or len(shape) > _DIMENSIONS:
-                raise BrokenSceneError(f"an array of {dtype} {shape}")
-            kinds.append((np.dtype(dtype), tuple(shape)))
-        number, size = _open(folder / ARRAYS, self.resolver.limits.file_bytes)
-        with open(number, "rb") as stream:  # what is declared is there, or nothing is allocated
-            if sum(dtype.itemsize * math.prod(shape) for dtype, shape in kinds) != size:
-                raise BrokenSceneError(f"{ARRAYS} has {size} bytes; its arrays have another size")
-            for dtype, shape in kinds:
-                array = np.fromfile(stream, dtype, math.prod(shape)).reshape(shape)
-                if dtype.kind == "f" and not np.isfinite(array).all():
-                    raise BrokenSceneError("an array with numbers that are not finite")
-                self._arrays.append(array)
+        most = self.resolver.limits.file_bytes
+        self._arrays = read_arrays(folder / ARRAYS, self.record["arrays"], _DTYPES, most)
+        for array in self._arrays:
+            if array.dtype.kind == "f" and not np.isfinite(array).all():
+                raise BrokenSceneError("an array with numbers that are not finite")
 
     def _record(self, kind: type, data: Any) -> Any:
         if not isinstance(data, dict):

@@ -18,9 +18,9 @@ from hdrusd.importers.expansion import check_expansion
 from hdrusd.importers.flt_materials import MaterialReader
 from hdrusd.importers.flt_palettes import Palettes, read_palettes
 from hdrusd.importers.flt_records import Document, load
-from hdrusd.importers.flt_textures import TextureReader, resolver_of
+from hdrusd.importers.flt_textures import TextureReader
 from hdrusd.importers.flt_tree import Reference, Tree, TreeReader
-from hdrusd.importers.importer import Resolver
+from hdrusd.importers.importer import Resolver, resolver_of
 from hdrusd.legacy.scene import LegacyScene
 from hdrusd.report import Kind, Report
 

@@ -17,7 +17,6 @@ from pathlib import Path
 
 from hdrusd.errors import SourceRef
 from hdrusd.importers.flt_palettes import PaletteTexture
-from hdrusd.importers.importer import Resolver
 from hdrusd.legacy.scene import Image, Texture, Wrap
 from hdrusd.report import Kind, Report
 
@@ -120,8 +119,3 @@ def _beginning(path: Path, size: int) -> bytes:
             return file.read(size)
     except OSError:
         return b""
-
-
-def resolver_of(path: Path, above: Resolver) -> Resolver:
-    """For what an external file names: relative to itself, below the same roots."""
-    return Resolver(path, above.report, above.roots, above.search, above.limits)

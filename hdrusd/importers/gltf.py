@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from hdrusd.importers.gltf_accessors import Accessors
 from hdrusd.importers.gltf_animations import read_animations
 from hdrusd.importers.gltf_cameras import read_cameras
+from hdrusd.importers.gltf_compression import LIBRARIES, read_buffers
 from hdrusd.importers.gltf_document import Document, load, one_line
 from hdrusd.importers.gltf_images import Textures
 from hdrusd.importers.gltf_lights import EXTENSION, read_lights
@@ -16,7 +16,8 @@ from hdrusd.importers.importer import Resolver
 from hdrusd.legacy.scene import LegacyScene
 from hdrusd.report import Kind, Report
 
-#: Extensions that are read. KHR_texture_basisu is, in that each such image is a finding.
+#: Extensions that are read, beside those of compressed meshes, which need a library.
+#: KHR_texture_basisu is, in that each such image is a finding.
 EXTENSIONS = frozenset(
     {
         EXTENSION,
@@ -45,7 +46,7 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
     """
     document = load(resolver, report)
     _check_extensions(document)
-    accessors = Accessors(document, resolver)
+    accessors = read_buffers(document, resolver)
     materials = read_materials(document, Textures(document, accessors, resolver))
     lights, light_numbers = read_lights(document)
     skins = SkinReader(document, accessors)
@@ -75,15 +76,10 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
 
 
 def _check_extensions(document: Document) -> None:
-    for name in _names(document, "extensionsRequired"):
-        if name not in EXTENSIONS:
+    for name in document.extensions("extensionsRequired"):
+        if name not in EXTENSIONS | LIBRARIES.keys():
             raise document.root.error(f"requires the extension {one_line(name)}, which is not read")
-    for name in _names(document, "extensionsUsed"):
-        if name not in EXTENSIONS:
+    for name in document.extensions("extensionsUsed"):
+        if name not in EXTENSIONS | LIBRARIES.keys():
             text = f"extension {one_line(name)} is not read"
             document.root.note(Kind.DROPPED, "extension-unknown", text)
-
-
-def _names(document: Document, key: str) -> list[str]:
-    values = document.data.get(key, [])
-    return [v for v in values if isinstance(v, str)] if isinstance(values, list) else []

@@ -9,6 +9,7 @@ count costs nothing.
 from __future__ import annotations
 
 import binascii
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, unquote_to_bytes
@@ -21,8 +22,9 @@ from hdrusd.importers.importer import Resolver
 from hdrusd.legacy.scene import Floats
 from hdrusd.report import Kind
 
-_DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+#: componentType to dtype, and type to the numbers an element.
+COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 #: A sparse accessor may start from zeros that no byte of the file backs; more is refused.
 _ZERO_BASE_BYTES = 64 << 20
@@ -34,15 +36,18 @@ class Accessors:
     """All buffers of a document, and arrays made from them.
 
     Buffers are loaded at once: a missing one leaves nothing worth having, so it is an
-    InputError.
+    InputError. Those of the numbers ``unread`` are left empty.
     """
 
-    def __init__(self, document: Document, resolver: Resolver) -> None:
+    def __init__(
+        self, document: Document, resolver: Resolver, unread: Collection[int] = ()
+    ) -> None:
         self._document = document
         self._floats: dict[int, Floats] = {}
+        self._supplied: dict[int, memoryview | str] = {}
         files: dict[Path, memoryview] = {}
         self._buffers = [
-            self._buffer(position, item, resolver, files)
+            memoryview(b"") if position in unread else self._buffer(position, item, resolver, files)
             for position, item in enumerate(document.table("buffers"))
         ]
         #: Bytes of all buffers together: what distinct views into them can at most add up to.
@@ -73,6 +78,19 @@ class Accessors:
     def view(self, index: int) -> memoryview:
         """The bytes of a buffer view, as many as are there. Raises InputError."""
         item = self._document.table("bufferViews")[index]
+        supplied = self._supplied.get(index)
+        if supplied is None:
+            return self.part(item)
+        if isinstance(supplied, str):
+            raise item.error(supplied)
+        return supplied
+
+    def supply(self, index: int, content: memoryview | str) -> None:
+        """Let a buffer view have decompressed bytes, or say what is wrong with it."""
+        self._supplied[index] = content
+
+    def part(self, item: Item) -> memoryview:
+        """The bytes that an object's buffer, byteOffset and byteLength name. Raises InputError."""
         buffer_index = item.index("buffer", "buffers")
         length = item.integer("byteLength")
         if buffer_index is None or length is None:
@@ -123,8 +141,8 @@ class Accessors:
         return floats
 
     def _elements(self, item: Item) -> Elements:
-        width = _WIDTHS.get(item.text("type"))
-        dtype = _DTYPES.get(item.integer("componentType") or 0)
+        width = WIDTHS.get(item.text("type"))
+        dtype = COMPONENTS.get(item.integer("componentType") or 0)
         count = item.integer("count")
         if width is None or dtype is None or not count:
             raise item.error("want SCALAR, VEC2 to VEC4 or MAT4, a known componentType, a count")
@@ -162,7 +180,7 @@ class Accessors:
         sparse = item.child("sparse")
         count = sparse.integer("count")
         where, what = sparse.child("indices"), sparse.child("values")
-        dtype = _DTYPES.get(where.integer("componentType") or 0, "")
+        dtype = COMPONENTS.get(where.integer("componentType") or 0, "")
         if not count or not dtype.startswith("<u"):
             raise sparse.error("want a count and unsigned indices")
         places = self._strided(where, count, 1, np.dtype(dtype))[:, 0]

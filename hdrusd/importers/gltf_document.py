@@ -58,6 +58,11 @@ class Document:
             found = self._tables[name] = self.root.children(name)
         return found
 
+    def extensions(self, key: str) -> list[str]:
+        """The names in ``extensionsUsed`` or ``extensionsRequired``."""
+        values = self.data.get(key, [])
+        return [v for v in values if isinstance(v, str)] if isinstance(values, list) else []
+
     def keep_going(self, error: InputError, code: str, thing: str, consequence: str) -> None:
         """Turn an error about one thing into a finding; the rest of the file is used."""
         text = f"{error.problem}; {consequence}"

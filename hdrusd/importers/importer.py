@@ -43,6 +43,7 @@ class Resolver:
     roots: Sequence[Path] = ()
     search: Sequence[Path] = ()
     limits: Limits = field(default_factory=Limits)
+    found: set[Path] = field(default_factory=set)  # what ``find`` has answered, by real paths
 
     def __post_init__(self) -> None:
         base = self.source.resolve().parent
@@ -106,11 +107,14 @@ class Resolver:
                     thing,
                     f"{reference}: not found as written; {found.parent.name}/{found.name} is used",
                 )
+            self.found.add(found)
             return found
         why = "not found; add --search-path"
         if refused:
-            ancestor = os.path.commonpath([base, refused.parent])
-            why = f"outside the declared roots; --root {ancestor} would allow it"
+            why = "outside the declared roots"
+            ancestor = Path(os.path.commonpath([base, refused.parent]))
+            if ancestor != ancestor.parent:  # the whole disk is no root that one declares
+                why += f"; --root {ancestor} would allow it"
         code = "file-refused" if refused else "file-missing"
         self.report.add(Kind.MISSING, code, place, thing, f"{reference}: {why}")
         return None
@@ -134,6 +138,11 @@ def _existing(path: Path) -> Path | None:
     except (OSError, ValueError, RuntimeError):  # a name too long or unspeakable, a loop of links
         return None
     return None
+
+
+def resolver_of(path: Path, above: Resolver) -> Resolver:
+    """For what an external file names: relative to itself, below the same roots."""
+    return Resolver(path, above.report, above.roots, above.search, above.limits, above.found)
 
 
 class Importer(Protocol):

@@ -186,7 +186,10 @@ class _Builder:
             maps[f"{name}_map"] = found if found.channel != "rgb" else replace(found, channel="r")
         if "clearcoat_roughness" in pbr:
             pbr.setdefault("clearcoat", 0.0)
-        key = next((key for key in _NORMALS if key in said), "")
+        key, *again = [*(key for key in _NORMALS if key in said), ""]
+        if again[1:] and said[key].text != said[again[0]].text:
+            text = f"{said[again[0]].keyword} beside {said[key].keyword}, which counts"
+            self._note(Kind.INVALID, "mtl-repeated", text, said[again[0]])
         normal = self._map(key)
         if normal is not None:
             scale, bias = normal_texels()

@@ -22,7 +22,7 @@ import numpy as np
 
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.importers import importer, osgb, osgconv
-from hdrusd.importers.importer import SUFFIXES, Limits, Resolver
+from hdrusd.importers.importer import SUFFIXES, Limits, Resolver, resolver_of
 from hdrusd.importers.osg_geometry import GeometryReader
 from hdrusd.importers.osg_light_points import LightPointReader
 from hdrusd.importers.osg_lights import LightReader, LightSwitches
@@ -119,9 +119,7 @@ class Files:
         """
         if path not in self._read:
             self._read[path] = None
-            resolver = Resolver(
-                path, self.report, file.resolver.roots, file.resolver.search, file.resolver.limits
-            )
+            resolver = resolver_of(path, file.resolver)
             try:
                 if SUFFIXES.get(path.suffix.lower()) in _OWN:
                     return self.add(load(resolver, self.report), resolver)

@@ -122,6 +122,26 @@ def _obituary(reader: str, code: int, text: str, limits: Limits) -> str:
     return f"{reader} failed{last}; want a file that it can read"
 
 
+def run_module(
+    module: str, folder: Path, resolver: Resolver, *, reader: str, readable: Iterable[Path] = ()
+) -> None:
+    """Run ``python -m module folder`` so that it finds what we import. Raises InputError."""
+    # "" is where the user happens to be: no root.
+    modules = [*(Path(entry).absolute() for entry in sys.path if entry), _PYTHON[2]]
+    run(
+        [sys.executable, "-P", "-m", module, str(folder)],
+        folder=folder,
+        limits=resolver.limits,
+        source=resolver.source,
+        reader=reader,
+        readable=[*modules, *_PYTHON, *readable],
+        environment={
+            "PYTHONPATH": os.pathsep.join(map(str, modules)),
+            "OPENBLAS_NUM_THREADS": "1",  # each thread of OpenBLAS reserves address space
+        },
+    )
+
+
 def read(function: str, resolver: Resolver, report: Report) -> LegacyScene:
     """What the reader ``"module:function"``, run in a worker, makes of ``resolver.source``.
 
@@ -137,19 +157,12 @@ def read(function: str, resolver: Resolver, report: Report) -> LegacyScene:
             "limits": asdict(resolver.limits),
         }
         (folder / _TASK).write_text(json.dumps(task), encoding="utf-8")
-        # "" is where the user happens to be: no root.
-        modules = [*(Path(entry).absolute() for entry in sys.path if entry), _PYTHON[2]]
-        run(
-            [sys.executable, "-P", "-m", "hdrusd.importers.worker", str(folder)],
-            folder=folder,
-            limits=resolver.limits,
-            source=resolver.source,
+        run_module(
+            "hdrusd.importers.worker",
+            folder,
+            resolver,
             reader=f"the reader {function.partition(':')[0].rpartition('.')[2]}",
-            readable=[*modules, *_PYTHON, *resolver.roots],
-            environment={
-                "PYTHONPATH": os.pathsep.join(map(str, modules)),
-                "OPENBLAS_NUM_THREADS": "1",  # each thread of OpenBLAS reserves address space
-            },
+            readable=resolver.roots,
         )
         return load_scene(folder, resolver, report)
 

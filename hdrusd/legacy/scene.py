@@ -75,6 +75,7 @@ class Texture:
     # Of data: value = scale * texel + bias. A colour is multiplied by its factor instead.
     scale: Four = (1.0, 1.0, 1.0, 1.0)
     bias: Four = (0.0, 0.0, 0.0, 0.0)
+    linear: bool = False  # of light: integer texels are values and no codes for a screen
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from hdrusd.account.images import image_rows
 from hdrusd.account.reflectances import Reflectances
 from hdrusd.account.wear import Worn
 from hdrusd.importers.importer import Resolver
-from hdrusd.legacy.scene import Image
+from hdrusd.legacy.scene import Image, Texture
 from hdrusd.maps import MapWriter
 from hdrusd.overlay.areas import Areas
 from hdrusd.photometry.interpret import Interpreter
@@ -35,6 +35,9 @@ from hdrusd.usd.source_stage import source_layer
 
 #: ``photometric:rule`` of an emission that no photometry file states.
 LETTER = "UsdPreviewSurface, cd/m2"
+
+#: Keys of a photometry rule that make a material a lamp.
+_LAMP = frozenset({"luminance", "candela", "lumens"})
 
 #: Of a reflectance that a picture or a node states, which stays.
 AS_IT_WAS = "UsdPreviewSurface, as it was"
@@ -82,8 +85,8 @@ class MaterialOverlay:
             text = "no UsdPreviewSurface; kept as it is"
             findings.finding("usd-material-kept", text, Kind.REPLACED)
             return
-        lamp = rule is not None and "luminance" in rule.values
-        source = read_source_surface(prim, surface, findings, self._image, emission_map=lamp)
+        lamp = rule is not None and bool(_LAMP & rule.values.keys())
+        source = read_source_surface(prim, surface, findings, self._picture, emission_map=lamp)
         material = replace(source.material, source=here)
         source = replace(source, material=material)
         glossed = self.maker.glossed(material)
@@ -123,8 +126,8 @@ class MaterialOverlay:
         sizes = [row["area_m2"] for row in rows]
         return rows, image_rows(materials, surfaces, sizes, self.maps.written)
 
-    def _image(self, node: Node, name: str) -> Image | None:
-        """The picture of a texture node, where it holds 8-bit codes for a screen."""
+    def _picture(self, node: Node, name: str) -> Texture | None:
+        """The picture of a texture node; of a diffuse colour only 8-bit codes for a screen."""
         findings = Findings(self.report, self.place, node.shader.GetPrim())
         file = findings.file(node, name)
         if not file:
@@ -142,8 +145,9 @@ class MaterialOverlay:
             image = Image(written, self.place, data=asset_bytes(file))
         else:
             image = Image(written, self.place, path=Path(file).resolve())
-        stated = node.value("sourceColorSpace", "auto") == "sRGB"
-        return image if self.maps.coded(image, stated=stated) else None
+        space = node.value("sourceColorSpace", "auto")
+        coded = space != "raw" and self.maps.coded(image, stated=space == "sRGB")
+        return Texture(image, linear=not coded) if coded or name == "emissiveColor" else None
 
 
 def _kept(source: SourceSurface, made: Surface) -> bool:

@@ -77,11 +77,13 @@ class Overlay:
         if source.stat().st_size > options.limits.file_bytes:
             raise InputError(source, f"want at most {options.limits.file_bytes} bytes")
         self.stage = open_source(source, self.resolver.allowed, report)
-        stated = {"metersPerUnit": options.source_unit, "upAxis": options.up}
+        unit, up = options.source_unit or sidecar.unit_m, options.up or sidecar.up
+        stated = {"metersPerUnit": unit, "upAxis": up}
         for key, value in stated.items():
             if value is not None:
                 self.stage.GetRootLayer().pseudoRoot.SetInfo(key, value)
-        self.unit_stated = source_layer(self.stage).pseudoRoot.HasInfo("metersPerUnit")
+        said = source_layer(self.stage).pseudoRoot.HasInfo("metersPerUnit")
+        self.unit_stated = said or unit is not None
         self._check_output()
         count, nested = population(self.stage)
         if nested > _MOST_NESTED:
@@ -141,8 +143,9 @@ class Overlay:
             textures=self.maps.written | self.luminaires.written | self.skies.written,
             diagonal=self._diagonal(),
             ground=extents(self.stage)[1],
-            unit_stated=self.unit_stated or self.options.source_unit is not None,
+            unit_stated=self.unit_stated,
             source=self.source,
+            parts=set(files_of(self.stage)),
         )
         result.note_unmatched(self.sidecar, self.options)
         return result
@@ -224,7 +227,7 @@ class Overlay:
         if self.options.meters_per_unit not in (1.0, unit):
             text = f"--metersPerUnit is not used; the stage keeps its {unit:g} m"
             self._note(Kind.DROPPED, "usd-option", "", text)
-        if not self.unit_stated and self.options.source_unit is None:
+        if not self.unit_stated:
             text = f"no metersPerUnit; {unit:g}, as USD reads it. See --source-unit"
             self._note(Kind.ASSUMED, "no-units", "", text)
         for rule in self.sidecar.rules:

@@ -139,9 +139,10 @@ KEYS["lamp"] = KEYS["light"] | {
 
 #: Of a source that is a stage already.
 _USD: dict[str, Any] = {"light_unit": Word(tuple(LIGHT_UNITS))}
+_SOURCE: dict[str, Any] = {"unit": Range(1e-9, 1e9), "up": Word(("Y", "Z"))}  # m
 
 #: Tables of which there is one.
-_SINGLE = {"ambient": AMBIENT, "usd": _USD}
+_SINGLE = {"ambient": AMBIENT, "source": _SOURCE, "usd": _USD}
 
 #: Keys that say something only beside one of others.
 _COMPANIONS: dict[str, dict[str, tuple[str, ...]]] = {

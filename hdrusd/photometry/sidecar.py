@@ -1,6 +1,8 @@
 """photometry.toml: what a person knows about the lamps and surfaces of a database.
 
     gamma = 2.2
+    [source]
+    unit = 0.0254               # m; and up = "Z": where the format does not say or is wrong
     [ambient]
     illuminance = 0.05          # lx; or preset = "moonlit", with altitude and azimuth
     [[light]]
@@ -153,6 +155,8 @@ class Sidecar:
     path: Path | None = None
     gamma: float | None = None
     ambient: Rule | None = None
+    unit_m: float | None = None  # of the source, where it does not say or is wrong
+    up: str | None = None  # "Y" or "Z", likewise
     light_unit: str = "nits"  # of a USD source: a name of photometry.light_unit.LIGHT_UNITS
     rules: list[Rule] = field(default_factory=list)
 
@@ -206,7 +210,10 @@ def read_sidecar(path: Path, report: Report) -> Sidecar:
             else:
                 invalid(report, place, "", f"{shown(value)}; want {GAMMA}")
         elif key == "usd":
-            sidecar.light_unit = _read_light_unit(value, place, report)
+            sidecar.light_unit = str(_table(value, key, place, report).get("light_unit", "nits"))
+        elif key == "source":
+            stated = _table(value, key, place, report)
+            sidecar.unit_m, sidecar.up = stated.get("unit"), stated.get("up")
         elif key == "ambient":
             sidecar.ambient = _read_ambient(value, place, report)
         elif key in KEYS:
@@ -216,11 +223,11 @@ def read_sidecar(path: Path, report: Report) -> Sidecar:
     return sidecar
 
 
-def _read_light_unit(table: Any, place: SourceRef, report: Report) -> str:
+def _table(table: Any, section: str, place: SourceRef, report: Report) -> dict[str, Any]:
     if not isinstance(table, dict):
-        invalid(report, place, "", "want a table, [usd]")
-        return "nits"
-    return str(checked(table, "usd", place, report).get("light_unit", "nits"))
+        invalid(report, place, "", f"want a table, [{section}]")
+        return {}
+    return checked(table, section, place, report)
 
 
 def _read_ambient(table: Any, place: SourceRef, report: Report) -> Rule | None:

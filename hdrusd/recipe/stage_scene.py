@@ -14,7 +14,7 @@ import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from hdrusd.errors import SourceRef
-from hdrusd.legacy.scene import Image, LegacyScene, Light, Mesh, Node
+from hdrusd.legacy.scene import Image, LegacyScene, Light, Mesh, Node, Texture
 from hdrusd.report import Report
 from hdrusd.usd import light_overs, preview_overs
 from hdrusd.usd.lux import is_light, light_kind
@@ -108,9 +108,10 @@ class _Reader:
         if surface is None or preview_overs.is_photometric(prim):
             return None
 
-        def named(node: ShaderNode, thing: str) -> Image:
+        def named(node: ShaderNode, thing: str) -> Texture:
             asset = node.value("file", None)
-            return Image(asset.path if isinstance(asset, Sdf.AssetPath) else "", self.place)
+            name = asset.path if isinstance(asset, Sdf.AssetPath) else ""
+            return Texture(Image(name, self.place))
 
         findings = Findings(Report(), self.place, prim)  # convert tells them
         read = preview_overs.read_source_surface(prim, surface, findings, named, emission_map=True)

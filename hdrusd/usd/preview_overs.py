@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from pxr import Gf, Sdf, Usd, UsdShade
 
-from hdrusd.legacy.scene import RGB, Image, Material, Texture
+from hdrusd.legacy.scene import RGB, Material, Texture
 from hdrusd.report import Kind
 from hdrusd.usd.material import Map, Surface
 from hdrusd.usd.network import Findings, Node, Values, surface_nodes
@@ -29,7 +29,7 @@ _BLACK, _WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
 #: The picture that a texture node names, for a thing of the material; None where there is none
 #: that may be read. "diffuseColor" and "emissiveColor" are the things.
-ImageOf = Callable[[Node, str], Image | None]
+PictureOf = Callable[[Node, str], Texture | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ def preview_surface(material: UsdShade.Material) -> Node | None:
 
 
 def read_source_surface(
-    prim: Usd.Prim, surface: Node, findings: Findings, image_of: ImageOf, *, emission_map: bool
+    prim: Usd.Prim, surface: Node, findings: Findings, picture_of: PictureOf, *, emission_map: bool
 ) -> SourceSurface:
     """A material in the terms of the other formats.
 
@@ -80,17 +80,17 @@ def read_source_surface(
         specular = _BLACK
     picture = glow = None
     if diffuse_node is not None and not _raw(diffuse_node):
-        picture = image_of(diffuse_node, "diffuseColor")
+        picture = picture_of(diffuse_node, "diffuseColor")
     if emission_node is not None and emission_map:
-        glow = image_of(emission_node, "emissiveColor")
+        glow = picture_of(emission_node, "emissiveColor")
     material = Material(
         name=prim.GetName(),
         source=findings.place,
         diffuse=diffuse,
         specular=specular,
         emission=emission,
-        diffuse_map=None if picture is None else Texture(picture),
-        emission_map=None if glow is None else Texture(glow),
+        diffuse_map=picture,
+        emission_map=glow,
         emission_cd_m2=True,
         pbr=pbr,
     )
@@ -113,7 +113,8 @@ def write_surface_over(
     if made.replaces_reflection:
         color("diffuseColor", _BLACK)
         _gloss(overs, source, _BLACK, None)
-        if source.surface.authored("clearcoat"):
+        coat = source.surface
+        if coat.authored("clearcoat") or coat.source("clearcoat") is not None:
             overs.value(surface, "inputs:clearcoat", _TYPES.Float, 0.0)
     else:
         if made.diffuse_map is not None and source.diffuse is not None:

@@ -127,6 +127,102 @@ def test_what_is_mended_by_one_line_is_one_entry(tmp_path: Path) -> None:
     assert dark["impact"] == pytest.approx(3.0)  # of each file, so of their mean too
 
 
+def test_recipes_of_one_name_are_told_apart(town: Path, tmp_path: Path) -> None:
+    (town / "south/broken.obj").unlink()
+    for folder, lamp in (("north", "Head"), ("south", "Globe")):
+        _lamp(town / folder / "second.gltf", lamp, 1.0)
+        (town / folder / "photometry.toml").write_text(
+            '[ambient]\npreset = "starlit-city"\n[[light]]\nmatch = "Lantern"\ncandela = 1\n'
+            f'[[light]]\nmatch = "{lamp}"\ncandela = 5\nprovenance = "estimated"\n'
+        )
+    report = tmp_path / "all.json"
+    done = process("convert", town, tmp_path / "out", "--report", report)
+    document = json.loads(report.read_text())
+    recipes = [f"{town}/{folder}/photometry.toml" for folder in ("north", "south")]
+    places = [row["place"] for row in document["unused_patterns"]]
+    assert places == [f"{recipe}:light[1]" for recipe in recipes]
+    lamps = [row for row in document["fix_first"] if "5 cd" in row["what"]]
+    assert sorted((row["where"], row["files"]) for row in lamps) == [(r, 2) for r in recipes]
+    lines = [line.strip() for line in done.err.splitlines()]
+    assert set(recipes) <= set(lines)  # below the entry that is mended there
+    words = " ".join(lines)
+    for recipe in recipes:
+        assert f"{recipe}:light[1]: Lantern: nothing of that name in any of its files" in words
+
+
+def test_of_equally_grave_entries_most_files_speak(tmp_path: Path) -> None:
+    pictures = {"a": "rare.png", "b": "usual.png", "c": "usual.png"}
+    for name, picture in pictures.items():
+        (tmp_path / f"{name}.obj").write_text(f"mtllib {name}.mtl\n{_TRIANGLE}")
+        (tmp_path / f"{name}.mtl").write_text(f"newmtl paint\nmap_Kd {picture}\n")
+    report = tmp_path / "all.json"
+    process("convert", tmp_path, tmp_path / "out", "--report", report)
+    rows = json.loads(report.read_text())["fix_first"]
+    missing = [(row["what"], row["files"]) for row in rows if "missing texture" in row["what"]]
+    assert missing == [("1 missing texture: usual.png", 3)]
+
+
+@pytest.mark.parametrize("alone", [True, False])
+def test_an_option_for_some_files_wants_a_run_of_their_own(tmp_path: Path, alone: bool) -> None:
+    (tmp_path / "car.obj").write_text(_TRIANGLE)  # no unit, and a car of 1.4 m
+    if not alone:
+        _lamp(tmp_path / "head.gltf", "Head", 1000.0)  # in metres, by its format
+    report = tmp_path / "all.json"
+    process("convert", tmp_path, tmp_path / "out", "--report", report)
+    rows = json.loads(report.read_text())["fix_first"]
+    (why,) = [row["why"] for row in rows if row["write"] == "--source-unit METERS"]
+    assert ("convert these in one of their own" in why) is not alone
+
+
+def test_a_second_run_over_its_own_output_finds_what_the_first_did(
+    town: Path, cli: CommandLine
+) -> None:
+    (town / "south/broken.obj").unlink()
+    # A stage that photometry has nothing to say of; all it gets is two layers.
+    (town / "bare.usda").write_text(
+        '#usda 1.0\n(\n defaultPrim = "a"\n metersPerUnit = 1\n upAxis = "Y"\n)\n'
+        'def Mesh "a" {\n int[] faceVertexCounts = [3]\n int[] faceVertexIndices = [0, 1, 2]\n'
+        " point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]\n}\n"
+    )
+    cli.run("convert", town, town / "old", code=0)
+    first = cli.run("convert", town, town / "new", code=0)
+    second = cli.run("convert", town, town / "new", code=0)
+    assert second.out == first.out
+    assert len(first.out.splitlines()) == 3
+    assert "passed over, stages and layers that hdrusd wrote: 10 (" in second.err
+    assert "passed over" not in cli.run("convert", town, town / "new", "--quiet", code=0).err
+    # Into the folder itself too: what stands beside a source is none.
+    (town / "bare.usda").unlink()
+    first = cli.run("convert", town, town, code=0)
+    assert cli.run("convert", town, town, code=0).out == first.out
+
+
+def test_what_is_wrong_for_all_files_is_said_once(
+    town: Path, tmp_path: Path, cli: CommandLine
+) -> None:
+    out = tmp_path / "out"
+    missing = tmp_path / "no.toml"
+    line = cli.refused("convert", town, out, "--photometry", missing, code=3)
+    assert line.strip().endswith("no.toml: no such file")
+    line = cli.refused("convert", town, out, "--estimate", "moonshine", code=2)
+    assert "moonshine: unknown" in line
+    assert (
+        cli.refused("convert", tmp_path / "twon", out, code=3)
+        .strip()
+        .endswith("twon: no such file or folder")
+    )
+    (tmp_path / "file").touch()
+    line = cli.refused("convert", town, tmp_path / "file/out", code=1)
+    assert f"nothing can be written in {tmp_path}/file (" in line
+    assert not out.exists()
+
+
+def test_a_name_of_two_lines_is_told_in_one(tmp_path: Path, cli: CommandLine) -> None:
+    (tmp_path / "two\nlines.obj").write_text("f 1 2 3\n")
+    said = cli.run("convert", tmp_path, tmp_path / "out", code=3)
+    assert f"{tmp_path}/two lines.obj:" in said.err
+
+
 def test_a_file_that_kills_its_process_is_one_line(tmp_path: Path) -> None:
     for name in ("before", "deadly", "later", "last"):
         (tmp_path / f"{name}.obj").write_text(_TRIANGLE)

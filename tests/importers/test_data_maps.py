@@ -174,6 +174,15 @@ def test_a_height_is_no_normal_and_packed_maps_have_no_firm_order(tmp_path: Path
     assert loaded.finding("mtl-dropped").text.startswith("bump, map_RMA, map_ORM")
 
 
+def test_of_two_normal_maps_one_counts_and_the_other_is_said(tmp_path: Path) -> None:
+    loaded = load_material(tmp_path, "map_norm b.png\nnorm a.png")
+    assert loaded.material.normal_map is not None
+    assert loaded.material.normal_map.image.name == "a.png"
+    assert loaded.finding("mtl-repeated").text == "map_norm beside norm, which counts"
+    alike = load_material(tmp_path, "map_norm a.png\nnorm a.png")
+    assert not alike.findings("mtl-repeated")
+
+
 # -- COLLADA ------------------------------------------------------------------------------
 
 IMAGE = '<library_images><image id="i"><init_from>a.png</init_from></image></library_images>'

@@ -114,6 +114,8 @@ def test_an_interrupted_program_leaves_no_worker(tmp_path: Path) -> None:
         "    import time\n"
         f"    while not Path({str(tmp_path)!r}, 'child').exists(): time.sleep(0.05)\n"
         "    signal.raise_signal(signal.SIGINT)\n"
+        # Who starts the tests in the background hands down an ignored SIGINT.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "threading.Thread(target=stop, daemon=True).start()\n"
         f"command = [sys.executable, '-c', {SLEEP!r}]\n"
         f"worker.run(command, folder=Path({str(tmp_path)!r}), limits=Limits(worker_seconds=60),\n"
