@@ -31,6 +31,7 @@ from .options import (
 )
 
 if TYPE_CHECKING:
+    from hdrusd.account.many import Converted
     from hdrusd.conversion import Options
 
 
@@ -98,7 +99,8 @@ def command(
 
     Several sources, or a folder, which stands for every database below it, become the same tree
     of stages below the folder OUTPUT. Each may name files anywhere in that folder; one that is
-    refused, or that kills its reader, does not stop the others.
+    refused, or that kills its reader, does not stop the others. Hidden files, links that lead out
+    and what hdrusd wrote are passed over.
     """
     if not sources:  # the one name that is there went to OUTPUT
         raise click.UsageError("Missing argument 'OUTPUT'.")
@@ -191,17 +193,19 @@ def _convert_many(
 
     tasks = plan(sources, output, options.photometry, passed_over)
     _check_writable(output)
-    rows = []
-    with closing(convert_all(tasks, options, jobs or CORES)) as run:
-        for row in run:
-            rows.append(row)
-            if row.code:
-                click.echo(_refusal(row.source, row.error), err=True)
-            elif not telling.as_json:
-                click.echo(_line(row.output, row.document))
-    document = batch_document(rows)
-    if telling.report_file is not None:
-        write_report(telling.report_file, document)
+    rows: list[Converted] = []
+    try:
+        with closing(convert_all(tasks, options, jobs or CORES)) as run:
+            for row in run:
+                rows.append(row)
+                if row.code:
+                    click.echo(_refusal(row.source, row.error), err=True)
+                elif not telling.as_json:
+                    click.echo(_line(row.output, row.document))
+    finally:  # of an interrupted run what was done
+        document = batch_document(rows)
+        if telling.report_file is not None:
+            write_report(telling.report_file, document)
     telling.account(document, partial(batch_summary, document))
     if any(row.code for row in rows):
         sys.exit(InputError.exit_code)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from hdrusd.account.many import Converted, parts_of_others
 from hdrusd.batch.plan import plan
 from hdrusd.errors import InputError
 
@@ -125,3 +126,13 @@ def test_a_folder_without_a_database_is_refused(tmp_path: Path) -> None:
     _touch(tmp_path / "readme.txt")
     with pytest.raises(InputError, match="no database in it"):
         plan([tmp_path], tmp_path / "out")
+
+
+def test_of_a_circle_one_file_counts(tmp_path: Path) -> None:
+    a, b, c = (tmp_path / f"{name}.usda" for name in "abc")
+    rows = [
+        Converted(a, a, {}, parts={b}),
+        Converted(b, b, {}, parts={a, b}),
+        Converted(c, c, {}, parts={c}),
+    ]
+    assert parts_of_others(rows) == {b}

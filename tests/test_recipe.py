@@ -324,6 +324,19 @@ def test_a_picture_is_looked_at_once() -> None:
     assert asked == ["wall.png"]
 
 
+def test_the_unit_that_was_stated_stands_in_the_recipe(tmp_path: Path) -> None:
+    """An inch, and Z up: convert without options then has the square 0.0254 m wide."""
+    source = obj(tmp_path / "a.obj", "Kd 0.5 0.5 0.5")
+    options = ["--source-unit", "0.0254", "--up", "Z"]
+    assert CliRunner().invoke(hdrusd, ["recipe", "init", str(source), *options]).exit_code == 0
+    written = tomllib.loads((tmp_path / "photometry.toml").read_text())
+    assert written["source"] == {"unit": 0.0254, "up": "Z"}
+    result = run(source)
+    assert result.unit_stated
+    assert result.diagonal == pytest.approx(0.0254 * 2.0**0.5, rel=1e-6)
+    assert not any(finding.code.startswith("sidecar") for finding in result.report)
+
+
 def test_a_unit_is_a_number(tmp_path: Path) -> None:
     source = obj(tmp_path / "a.obj", "Kd 1 1 1")
     done = init(str(source), "-", "--source-unit", "nan")

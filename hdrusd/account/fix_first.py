@@ -164,7 +164,8 @@ def _dark(scene: Scene) -> Iterator[Entry]:
     else:
         what, impact = "nothing shines: no light in the source, no surface that glows", 3.0
         why = "a stage without light is black at night"
-    why += "; full moon gives 0.25 lx, a lit city's sky 0.05"
+    why += "; full moon gives 0.25 lx, a lit city's sky 0.05; what is only placed in other stages "
+    why += "needs none, or their skies add up"
     yield Entry(impact, what, why, PHOTOMETRY, "[ambient]\nilluminance = 0.05")
 
 

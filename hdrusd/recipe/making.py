@@ -51,7 +51,7 @@ def write_recipe(
     scene.unit_m, scene.up = source_unit or scene.unit_m, up or scene.up
     found = leads(scene, _picture)
     counted = sum(lead.counts for lead in found)
-    text = recipe(source.name, found)
+    text = recipe(source.name, found, unit_m=source_unit, up=up)
     if output is not None:
         write_atomically(output, lambda path: _write(path, text))
     return Recipe(text, counted + 1, len(found) - counted)

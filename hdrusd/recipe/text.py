@@ -30,9 +30,15 @@ A night without a moon; or moonlit, dusk, overcast-day, clear-sun, ... or illumi
 _UNITS = {"candela": "cd", "lumens": "lm", "luminance": "cd/m2"}
 
 
-def recipe(name: str, found: Sequence[Lead]) -> str:
-    """The text of a photometry file for the database ``name``."""
+def recipe(
+    name: str, found: Sequence[Lead], *, unit_m: float | None = None, up: str | None = None
+) -> str:
+    """The text of a photometry file for the database ``name``; its unit and axis where stated."""
     parts = [_comment(_HEAD.format(name=one_line(name)))]
+    stated = [f"unit = {unit_m!r}  # m"] if unit_m else []
+    stated += [f"up = {quoted(up)}"] if up else []
+    if stated:
+        parts.append("\n".join(["[source]", *stated]))
     parts.append(_comment(_SKY) + '\n[ambient]\npreset = "moonless"')
     parts.extend(_entry(lead) for lead in found)
     if not found:

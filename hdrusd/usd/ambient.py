@@ -58,6 +58,7 @@ def read_ambient(
     time = cache.GetTime()
     total, skies = np.zeros(3), list[Sky]()
     spoken_for: set[Sdf.Path] = set()
+    plain = 0
     if has_ambient(stage):
         root = stage.GetDefaultPrim()
         targets = root.GetRelationship("photometric:ambient:light").GetTargets()
@@ -66,7 +67,9 @@ def read_ambient(
         if stated is not None:
             spoken_for.update(targets)
             if shown or not targets:
-                total += _sound(stated, root, report)
+                lux = _sound(stated, root, report)
+                plain += bool(lux.any())
+                total += lux
     for prim in (dome for dome in domes if _visible(dome, time)):
         if prim.GetPath() in spoken_for:
             if dome_picture(prim, time):
@@ -77,9 +80,13 @@ def read_ambient(
         lux = _sound(lux, prim, report)
         sky = read_sky(prim, time, _rgb(lux), cache.GetLocalToWorldTransform(prim), report)
         if sky is None:
+            plain += bool(lux.any())
             total += lux
         else:
             skies.append(replace(sky, visible=sky_visible))
+    if plain > 1:
+        text = f"{plain} skies without a picture add up; a model that is placed needs none"
+        prim_finding(report, stage.GetPseudoRoot(), Kind.ASSUMED, "skies-add", text)
     return _rgb(total), tuple(skies)
 
 

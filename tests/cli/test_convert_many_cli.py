@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 from command_line import HDRUSD, CommandLine, process
+from pxr import Usd, UsdGeom
 from report_schema import batch_problems
 
 #: An OBJ whose one triangle has an area of 0.5 m2.
@@ -171,7 +172,7 @@ def test_an_option_for_some_files_wants_a_run_of_their_own(tmp_path: Path, alone
     process("convert", tmp_path, tmp_path / "out", "--report", report)
     rows = json.loads(report.read_text())["fix_first"]
     (why,) = [row["why"] for row in rows if row["write"] == "--source-unit METERS"]
-    assert ("convert these in one of their own" in why) is not alone
+    assert ("[source] unit beside these is not" in why) is not alone
 
 
 def test_a_second_run_over_its_own_output_finds_what_the_first_did(
@@ -248,9 +249,9 @@ def test_a_file_that_kills_its_process_is_one_line(tmp_path: Path) -> None:
 def test_an_interrupt_leaves_whole_stages_only(tmp_path: Path, whole_group: bool) -> None:
     for number in range(400):
         (tmp_path / f"{number:03}.obj").write_text(_TRIANGLE)
-    out = tmp_path / "out"
+    out, report = tmp_path / "out", tmp_path / "all.json"
     job = subprocess.Popen(
-        [*HDRUSD, "convert", str(tmp_path), str(out), "--jobs", "2"],
+        [*HDRUSD, "convert", str(tmp_path), str(out), "--jobs", "2", "--report", str(report)],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
@@ -267,11 +268,62 @@ def test_an_interrupt_leaves_whole_stages_only(tmp_path: Path, whole_group: bool
     assert err.strip() == "interrupted"
     assert not list(out.glob(".*"))
     stages = {path.stem for path in out.glob("*.usda") if "." not in path.stem}
+    told = [Path(row["source"]).stem for row in json.loads(report.read_text())["files"]]
+    assert told == [f"{number:03}" for number in range(len(told))]  # what was done, in order
+    assert set(told) <= stages
     assert "001" in stages
     assert "399" not in stages
     for stem in stages:
         assert (out / f"{stem}.photometry.usda").exists()
         assert (out / f"{stem}.geometry.usdc").exists()
+
+
+def test_parts_of_others_are_counted_once(tmp_path: Path) -> None:
+    """A lamp of 1000 cd, in a file of its own, that a street refers to twice."""
+    folder = tmp_path / "library"
+    folder.mkdir()
+    head = '#usda 1.0\n(\n defaultPrim = "a"\n metersPerUnit = 1\n upAxis = "Y"\n)\n'
+    # pi r^2 nits of a sphere of radius 1 m are its candela.
+    (folder / "lamp.usda").write_text(
+        f'{head}def SphereLight "a" {{\n float inputs:radius = 1\n'
+        f" float inputs:intensity = {1000.0 / 3.141592653589793}\n}}\n"
+    )
+    (folder / "street.usda").write_text(
+        f'{head}def Xform "a" {{\n'
+        + "".join(f' def "l{i}" (references = @./lamp.usda@) {{}}\n' for i in range(2))
+        + "}\n"
+    )
+    report = tmp_path / "all.json"
+    assert process("convert", folder, tmp_path / "out", "--report", report).code == 0
+    document = json.loads(report.read_text())
+    assert batch_problems(document) == []
+    assert {Path(row["source"]).name: row["part"] for row in document["files"]} == {
+        "lamp.usda": True,
+        "street.usda": False,
+    }
+    assert (document["totals"]["converted"], document["totals"]["parts"]) == (2, 1)
+    assert document["totals"]["lamps"] == 2
+    assert (tmp_path / "out/lamp.usda").exists()
+
+
+def test_a_folders_recipe_says_its_unit(tmp_path: Path) -> None:
+    """An OBJ in inches whose Z is up beside one that needs nothing: 1 x 25.4 mm = 0.0254 m."""
+    for name in ("inches", "metres"):
+        (tmp_path / "db" / name).mkdir(parents=True)
+        (tmp_path / "db" / name / "a.obj").write_text(_TRIANGLE)
+    recipe = tmp_path / "db/inches/photometry.toml"
+    recipe.write_text('[source]\nunit = 0.0254\nup = "Z"\n')
+    out = tmp_path / "out"
+    assert process("convert", tmp_path / "db", out).code == 0
+    stages = {name: Usd.Stage.Open(str(out / name / "a.usda")) for name in ("inches", "metres")}
+    lengths, ups = {}, {}
+    for name, stage in stages.items():
+        (mesh,) = (prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh))
+        matrix = UsdGeom.Xformable(mesh).ComputeLocalToWorldTransform(Usd.TimeCode.Default())
+        lengths[name] = matrix.TransformDir((1, 0, 0)).GetLength()
+        ups[name] = UsdGeom.GetStageUpAxis(stage)
+    assert lengths == {"inches": pytest.approx(0.0254, rel=1e-6), "metres": 1.0}
+    assert ups == {"inches": "Z", "metres": "Y"}
 
 
 def test_wrong_use(town: Path, tmp_path: Path, cli: CommandLine) -> None:

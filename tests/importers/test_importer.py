@@ -119,3 +119,18 @@ def test_a_suffix_without_a_reader_is_an_input_error(model: Path) -> None:
     other.write_bytes(b"")
     with pytest.raises(InputError, match=r"\.blend: no reader; want .*\.gltf"):
         read(Resolver(other, Report()), Report())
+
+
+def test_the_whole_disk_is_never_advised_as_a_root(tmp_path: Path) -> None:
+    """/usr and the test's folder have nothing but / in common."""
+    outside = Path("/usr/bin/env")
+    if tmp_path.resolve().parts[1] == "usr" or not outside.exists():
+        pytest.skip("no file beyond the top folder that the tests' folder is in")
+    source = tmp_path / "a.obj"
+    source.touch()
+    report = Report()
+    resolver = Resolver(source, report)
+    assert resolver.find(str(outside), SourceRef(source)) is None
+    (finding,) = report
+    assert finding.code == "file-refused"
+    assert "--root" not in finding.text

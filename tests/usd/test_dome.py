@@ -205,3 +205,17 @@ def test_shadows_of_a_dome_may_be_switched_off() -> None:
     assert sky(light).shadow
     UsdLux.ShadowAPI.Apply(light.GetPrim()).CreateShadowEnableAttr(False)
     assert not sky(light).shadow
+
+
+def test_plain_skies_add_up_and_it_is_said() -> None:
+    stage, report = new_stage(), Report()
+    domes = [UsdLux.DomeLight.Define(stage, f"/Sky{i}") for i in range(2)]
+    for light in domes:
+        light.CreateIntensityAttr(1.0)
+    cache = UsdGeom.XformCache(Usd.TimeCode(0))
+    lux, _ = read_ambient(stage, [light.GetPrim() for light in domes], cache, report)
+    assert lux == pytest.approx((2.0 * math.pi,) * 3, rel=1e-6)  # pi L each
+    assert report.codes() == {"skies-add"}
+    alone = Report()
+    read(domes[0], alone)
+    assert "skies-add" not in alone.codes()
