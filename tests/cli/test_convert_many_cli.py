@@ -128,7 +128,10 @@ def test_what_is_mended_by_one_line_is_one_entry(tmp_path: Path) -> None:
     assert dark["impact"] == pytest.approx(3.0)  # of each file, so of their mean too
 
 
-def test_recipes_of_one_name_are_told_apart(town: Path, tmp_path: Path) -> None:
+def test_recipes_of_one_name_are_told_apart(
+    town: Path, tmp_path: Path, cli: CommandLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # a long path is broken over two lines
     (town / "south/broken.obj").unlink()
     for folder, lamp in (("north", "Head"), ("south", "Globe")):
         _lamp(town / folder / "second.gltf", lamp, 1.0)
@@ -136,10 +139,9 @@ def test_recipes_of_one_name_are_told_apart(town: Path, tmp_path: Path) -> None:
             '[ambient]\npreset = "starlit-city"\n[[light]]\nmatch = "Lantern"\ncandela = 1\n'
             f'[[light]]\nmatch = "{lamp}"\ncandela = 5\nprovenance = "estimated"\n'
         )
-    report = tmp_path / "all.json"
-    done = process("convert", town, tmp_path / "out", "--report", report)
-    document = json.loads(report.read_text())
-    recipes = [f"{town}/{folder}/photometry.toml" for folder in ("north", "south")]
+    done = cli.run("convert", town.name, "out", "--report", "all.json")
+    document = json.loads(Path("all.json").read_text())
+    recipes = [f"{town.name}/{folder}/photometry.toml" for folder in ("north", "south")]
     places = [row["place"] for row in document["unused_patterns"]]
     assert places == [f"{recipe}:light[1]" for recipe in recipes]
     lamps = [row for row in document["fix_first"] if "5 cd" in row["what"]]
