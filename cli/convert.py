@@ -7,7 +7,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -184,8 +184,9 @@ def _convert_many(
     from hdrusd.report import Report
 
     RULES[options.estimate]  # what is wrong of all files is said once, and at once
+    recipes = Report()
     if options.photometry is not None:
-        read_sidecar(options.photometry, Report())
+        read_sidecar(options.photometry, recipes)
 
     def passed_over(line: str) -> None:
         if not telling.quiet:
@@ -193,6 +194,10 @@ def _convert_many(
 
     tasks = plan(sources, output, options.photometry, passed_over)
     _check_writable(output)
+    for path in sorted({task.photometry for task in tasks if task.photometry}):
+        with suppress(InputError):  # each of its files is refused, and says so
+            read_sidecar(path, recipes)
+    tell(recipes, telling.quiet)
     rows: list[Converted] = []
     try:
         with closing(convert_all(tasks, options, jobs or CORES)) as run:

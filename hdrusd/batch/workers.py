@@ -159,8 +159,8 @@ def _converted(task: Task, options: Options) -> Converted:
     except HdrusdError as error:
         return refused(task, report, error.exit_code, str(error))
     except OSError as error:
-        text = f"{task.source.name}: {error.filename or ''}: {error.strerror or error}"
-        return refused(task, report, 1, one_line(text.replace(": : ", ": ")))
+        parts = (task.source.name, error.filename, error.strerror or error)
+        return refused(task, report, 1, one_line(": ".join(str(part) for part in parts if part)))
     except Exception:  # a fault of ours: its traceback, and on with the others
         traceback.print_exc()
         text = f"{task.source.name}: not converted by a fault of hdrusd; its traceback stands above"

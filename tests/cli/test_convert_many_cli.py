@@ -328,6 +328,15 @@ def test_a_folders_recipe_says_its_unit(tmp_path: Path) -> None:
     assert ups == {"inches": "Z", "metres": "Y"}
 
 
+def test_what_is_wrong_in_a_recipe_is_said_in_words_and_once(town: Path, tmp_path: Path) -> None:
+    (town / "photometry.toml").write_text(
+        '[source]\nup = "Q"\n[[light]]\nmatch = "*"\ncandela = -1\n'
+    )
+    done = process("convert", town, tmp_path / "out")
+    for place in ("photometry.toml:source: up: ", "photometry.toml:light[1]: candela: "):
+        assert done.err.count(place) == 1, done.err
+
+
 def test_wrong_use(town: Path, tmp_path: Path, cli: CommandLine) -> None:
     one = town / "north/head.gltf"
     line = cli.refused("convert", town, tmp_path / "out.usda", code=2)

@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gltf_builder import COMPONENTS, TYPES, Doc
+from gltf_builder import COMPONENTS, TYPES, Doc, load
 
+from hdrusd.errors import InputError
+from hdrusd.importers.importer import Limits
 from hdrusd.legacy.scene import Mesh
 
 EXT, KHR = "EXT_meshopt_compression", "KHR_meshopt_compression"
@@ -128,3 +130,17 @@ def _turned(triangles: Any) -> list[Any]:
     """Each from its least corner on, so that their sense of rotation stays."""
     whole = np.rint(np.asarray(triangles, "f8") * 8).astype(int).tolist()
     return sorted(min([t, t[1:] + t[:1], t[2:] + t[:2]]) for t in whole)
+
+
+def sound_or_told(path: Path, pieces: int) -> None:
+    """A damaged file is refused, or each of its ``pieces`` is a sound mesh or a finding."""
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            scene, report = load(path, limits=Limits(worker_seconds=30))
+    except InputError:
+        return
+    assert len(scene.meshes) <= pieces
+    assert len(list(report)) >= pieces - len(scene.meshes)
+    for mesh in scene.meshes:
+        assert np.isfinite(mesh.points).all()
+        assert mesh.face_indices.max() < len(mesh.points)

@@ -22,6 +22,7 @@ from gltf_compressed import (
     assert_is_grid,
     needs_draco,
     needs_meshopt,
+    sound_or_told,
 )
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -338,14 +339,4 @@ def test_broken_streams_read_or_end_in_an_input_error(
         body[place % len(body)] ^= flip
         broken = bytes(body[: len(body) - cut])
         doc.draco(broken, {"POSITION": position}, {"POSITION": points}, indices)
-    path = doc.write(tmp_path / "scene.gltf")
-    try:
-        with np.errstate(over="ignore", invalid="ignore"):
-            scene, report = load(path, limits=Limits(worker_seconds=30))
-    except InputError:
-        return
-    assert len(scene.meshes) <= len(changes)
-    assert len(list(report)) >= len(changes) - len(scene.meshes)
-    for mesh in scene.meshes:
-        assert np.isfinite(mesh.points).all()
-        assert mesh.face_indices.max() < len(mesh.points)
+    sound_or_told(doc.write(tmp_path / "scene.gltf"), len(changes))

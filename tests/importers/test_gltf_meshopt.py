@@ -24,12 +24,12 @@ from gltf_compressed import (
     Compressed,
     assert_is_grid,
     needs_meshopt,
+    sound_or_told,
 )
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hdrusd.errors import InputError
-from hdrusd.importers.importer import Limits
 
 pytestmark = needs_meshopt
 
@@ -342,14 +342,4 @@ def test_broken_streams_read_or_end_in_an_input_error(
         ]
         primitive = {"attributes": {"POSITION": 2 * number}, "indices": 2 * number + 1}
         doc.json.setdefault("meshes", []).append({"primitives": [primitive]})
-    path = doc.write(tmp_path / "scene.gltf")
-    try:
-        with np.errstate(over="ignore", invalid="ignore"):
-            scene, report = load(path, limits=Limits(worker_seconds=30))
-    except InputError:
-        return
-    assert len(scene.meshes) <= len(changes)
-    assert len(list(report)) >= len(changes) - len(scene.meshes)
-    for mesh in scene.meshes:
-        assert np.isfinite(mesh.points).all()
-        assert mesh.face_indices.max() < len(mesh.points)
+    sound_or_told(doc.write(tmp_path / "scene.gltf"), len(changes))
