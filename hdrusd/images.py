@@ -169,6 +169,7 @@ def write_exr(
     luminance: bool = True,
     compression: Compression = "zip",
     layers: Mapping[str, npt.NDArray[np.floating[Any]]] | None = None,
+    tile: int | None = None,
 ) -> None:
     """Write linear Rec. 709 RGB or RGBA, (h, w, 3 or 4), top row first.
 
@@ -177,7 +178,7 @@ def write_exr(
     NumPy arrays of 9 or 16 floats). ``half``: half floats; what is beyond +-65504 is
     written as that (``half_clipped`` counts it), halves as they are. ``compression`` loses
     nothing. ``layers``: channels beside the colour, (h, w), by names as "scotopic.Y"; always
-    as float32.
+    as float32. ``tile``: in squares of so many pixels, as a texture, instead of scan lines.
     """
     dtype = np.float16 if half else np.float32
     if half and rgb.dtype != np.float16:  # slow in halves, which come from tables
@@ -189,6 +190,10 @@ def write_exr(
         "chromaticities": REC709,
         "software": "hdrusd",
     }
+    if tile:
+        squares = OpenEXR.TileDescription()
+        squares.ySize, squares.xSize = (min(tile, side) for side in pixels.shape[:2])
+        header |= {"type": OpenEXR.tiledimage, "tiles": squares}
     if luminance:
         header["whiteLuminance"] = 1.0
     header.update(attributes or {})

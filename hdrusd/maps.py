@@ -48,6 +48,9 @@ _MAGIC = 8
 #: Pixels of a picture that is decoded ahead; larger ones wait for their turn, one by one.
 _SMALL = 1 << 24
 
+#: Texels a side of a map's tiles.
+_TILE = 512
+
 Floats = npt.NDArray[np.float64]
 
 #: Of a picture's width and height, rows and columns (n,) of the texels that are wanted.
@@ -338,8 +341,11 @@ def _decoded(image: Image, most: int) -> _Picture | InputError | None:
 
 
 def _write_map(path: Path, color: npt.NDArray[Any]) -> None:
-    """Half floats by the compression that is quickest and smallest on what had 256 codes."""
-    write_exr(path, color, half=True, luminance=False, compression="piz")
+    """Half floats by the compression that is quickest and smallest on what had 256 codes.
+
+    PIZ makes a table of values for each piece of a file: of 32 lines, or of a tile.
+    """
+    write_exr(path, color, half=True, luminance=False, compression="piz", tile=_TILE)
 
 
 def _write_deep(path: Path, pixels: npt.NDArray[np.generic]) -> None:

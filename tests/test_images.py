@@ -258,6 +258,17 @@ def test_rgba_maps_keep_colour_beside_alpha(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_image(tmp_path / "map.exr").pixels, rgba)
 
 
+@pytest.mark.parametrize("shape", [(1, 1), (8, 8), (9, 17), (3, 40), (40, 3)])
+def test_tiles_hold_the_same_texels(tmp_path: Path, shape: tuple[int, int]) -> None:
+    rgb = np.random.default_rng(1).random((*shape, 3)).astype(np.float16)
+    path = tmp_path / "map.exr"
+    write_exr(path, rgb, half=True, luminance=False, compression="piz", tile=8)
+    np.testing.assert_array_equal(read_image(path).pixels, rgb)
+    np.testing.assert_array_equal(read_exr(path)[0], rgb)
+    spec = oiio.ImageInput.open(str(path)).spec()
+    assert (spec.tile_height, spec.tile_width) == (min(shape[0], 8), min(shape[1], 8))
+
+
 def test_broken_pictures_are_refused_in_one_line(tmp_path: Path) -> None:
     write_png(tmp_path / "a.png", np.zeros((64, 64, 3), np.uint8))
     whole = (tmp_path / "a.png").read_bytes()

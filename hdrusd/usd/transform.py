@@ -268,9 +268,18 @@ def aim(
         back = -target.GetNormalized()
         turn = Gf.Matrix3d(*side, *Gf.Cross(back, side), *back)
         return turn.ExtractRotation().GetQuat()
-    if target.GetLength() == 0.0 or Gf.IsClose(target.GetNormalized(), Gf.Vec3d(0, 0, -1), 1e-12):
+    if target.GetLength() == 0.0:
         return None
-    return Gf.Rotation(Gf.Vec3d(0, 0, -1), target).GetQuat()
+    x, y, z = target.GetNormalized()
+    across_z = math.hypot(x, y)
+    if z < 0.0 and across_z <= 1e-12:
+        return None
+    # 1 + cos and the sine's axis are a quaternion of the shortest turn; Gf.Rotation of two
+    # vectors takes those within 0.08 degrees of opposite ones for opposite.
+    if z > 0.0 and across_z == 0.0:
+        return Gf.Quatd(0.0, 0.0, -1.0, 0.0)
+    real = across_z * across_z / (1.0 + z) if z > 0.0 else 1.0 - z
+    return Gf.Quatd(real, y, -x, 0.0).GetNormalized()
 
 
 def across(vector: tuple[float, float, float], axis: tuple[float, float, float]) -> Gf.Vec3d | None:
