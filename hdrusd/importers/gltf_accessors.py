@@ -23,7 +23,12 @@ from hdrusd.legacy.scene import Floats
 from hdrusd.report import Kind
 
 #: componentType to dtype, and type to the numbers an element.
-COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+COMPONENTS = {
+    number: np.dtype(name)
+    for number, name in zip(
+        (5120, 5121, 5122, 5123, 5125, 5126), ("i1", "u1", "<i2", "<u2", "<u4", "<f4"), strict=True
+    )
+}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 #: A sparse accessor may start from zeros that no byte of the file backs; more is refused.
@@ -43,6 +48,8 @@ class Accessors:
         self, document: Document, resolver: Resolver, unread: Collection[int] = ()
     ) -> None:
         self._document = document
+        self._items = document.table("accessors")
+        self._views = document.table("bufferViews")
         self._floats: dict[int, Floats] = {}
         self._supplied: dict[int, memoryview | str] = {}
         files: dict[Path, memoryview] = {}
@@ -62,14 +69,14 @@ class Accessors:
         if values is None:
             values = self._floats[index] = self._to_floats(index)
         if values.shape[1] not in widths:
-            item = self._document.table("accessors")[index]
+            item = self._items[index]
             wanted = " or ".join(str(width) for width in widths)
             raise item.error(f"{values.shape[1]} numbers an element; want {wanted}")
         return values
 
     def integers(self, index: int) -> Elements:
         """(count,) unsigned integers. Raises InputError."""
-        item = self._document.table("accessors")[index]
+        item = self._items[index]
         values = self._elements(item)
         if values.dtype.kind != "u" or values.shape[1] != 1:
             raise item.error("not unsigned SCALAR; want that for indices")
@@ -77,7 +84,7 @@ class Accessors:
 
     def view(self, index: int) -> memoryview:
         """The bytes of a buffer view, as many as are there. Raises InputError."""
-        item = self._document.table("bufferViews")[index]
+        item = self._views[index]
         supplied = self._supplied.get(index)
         if supplied is None:
             return self.part(item)
@@ -114,7 +121,7 @@ class Accessors:
             if path is None:
                 raise item.error(f"buffer {one_line(uri)}: not found or outside the declared roots")
             if path not in files:
-                files[path] = memoryview(resolver.read(path))
+                files[path] = resolver.read_view(path)
             content = files[path]
         elif position == 0 and self._document.binary is not None:
             content = self._document.binary
@@ -128,7 +135,7 @@ class Accessors:
         return content[:declared]
 
     def _to_floats(self, index: int) -> Floats:
-        item = self._document.table("accessors")[index]
+        item = self._items[index]
         values = self._elements(item)
         if values.dtype.kind == "f":
             whole = values.flags.c_contiguous and values.flags.aligned
@@ -147,10 +154,10 @@ class Accessors:
         if width is None or dtype is None or not count:
             raise item.error("want SCALAR, VEC2 to VEC4 or MAT4, a known componentType, a count")
         if "bufferView" in item:
-            values = self._strided(item, count, width, np.dtype(dtype))
+            values = self._strided(item, count, width, dtype)
         elif "sparse" not in item:
             raise item.error("neither bufferView nor sparse: there are no data")
-        elif count * width * np.dtype(dtype).itemsize > _ZERO_BASE_BYTES:
+        elif count * width * dtype.itemsize > _ZERO_BASE_BYTES:
             raise item.error(f"{count} elements of zeros without bytes of their own")
         else:
             values = np.zeros((count, width), dtype)
@@ -162,7 +169,7 @@ class Accessors:
             raise item.error("no usable bufferView")
         view = self.view(index)
         element = width * dtype.itemsize
-        view_item = self._document.table("bufferViews")[index]
+        view_item = self._views[index]
         stride = element
         if "byteStride" in view_item:
             stride = view_item.integer("byteStride") or 0
@@ -172,18 +179,18 @@ class Accessors:
         end = start + (count - 1) * stride + element
         if end > len(view):
             raise item.error(f"{count} elements reach to byte {end}; the view has {len(view)}")
-        return np.ndarray(
-            (count, width), dtype, buffer=view, offset=start, strides=(stride, dtype.itemsize)
-        )
+        if stride == element:
+            return np.ndarray((count, width), dtype, view, start)
+        return np.ndarray((count, width), dtype, view, start, (stride, dtype.itemsize))
 
     def _substituted(self, item: Item, base: Elements) -> Elements:
         sparse = item.child("sparse")
         count = sparse.integer("count")
         where, what = sparse.child("indices"), sparse.child("values")
-        dtype = COMPONENTS.get(where.integer("componentType") or 0, "")
-        if not count or not dtype.startswith("<u"):
+        dtype = COMPONENTS.get(where.integer("componentType") or 0)
+        if not count or dtype is None or dtype.kind != "u":
             raise sparse.error("want a count and unsigned indices")
-        places = self._strided(where, count, 1, np.dtype(dtype))[:, 0]
+        places = self._strided(where, count, 1, dtype)[:, 0]
         if int(places.max()) >= len(base):
             raise where.error(f"index {places.max()}; the accessor has {len(base)} elements")
         values = base.copy()

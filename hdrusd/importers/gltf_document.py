@@ -165,9 +165,10 @@ class Item:
         if len(good) != len(values) or len(good) != len(default):
             self._wrong(key, f"{len(default)} finite numbers", f"{list(default)} is used")
             return default
+        if low <= min(good) and max(good) <= high:
+            return tuple(good)
         clamped = tuple(min(max(v, low), high) for v in good)
-        if clamped != tuple(good):
-            self.note(Kind.CLAMPED, "gltf-range", f"{key} is {good}; clamped to {list(clamped)}")
+        self.note(Kind.CLAMPED, "gltf-range", f"{key} is {good}; clamped to {list(clamped)}")
         return clamped
 
     def light_colour(self, key: str, default: tuple[float, float, float]) -> RGB:
@@ -198,10 +199,13 @@ class Item:
     def index(self, key: str, table: str) -> int | None:
         """A number of an entry of the top-level array ``table``, or None as ``integer`` does."""
         value = self.data.get(key)
-        if type(value) is int and 0 <= value < len(self.document.table(table)):
+        if value is None and key not in self.data:
+            return None
+        size = len(self.document.table(table))
+        if type(value) is int and 0 <= value < size:
             return value
         value = self.integer(key)
-        if value is not None and value >= (size := len(self.document.table(table))):
+        if value is not None and value >= size:
             self._wrong(key, f"one of the {size} {table}", "it is not used")
             return None
         return value
@@ -233,17 +237,17 @@ class Item:
         if not isinstance(values, list):
             self._wrong(key, "an array of objects", "it is not used")
             values = []
-        items = []
         above = f"{self.place}/{key}/"
         for position, value in enumerate(values):
-            place = f"{above}{position}"
             if not isinstance(value, dict):
-                ref = SourceRef(self.document.source, place)
+                ref = SourceRef(self.document.source, f"{above}{position}")
                 text = f"{reprlib.repr(value)}; want an object; it reads as an empty one"
                 self.document.report.add(Kind.INVALID, "gltf-value", ref, "", text)
-                value = {}
-            items.append(Item(self.document, place, value))
-        return items
+        document = self.document
+        return [
+            Item(document, f"{above}{position}", value if isinstance(value, dict) else {})
+            for position, value in enumerate(values)
+        ]
 
     def extension(self, name: str) -> Item | None:
         """The object of an extension, or None where this object does not use it."""
@@ -275,14 +279,13 @@ def load(resolver: Resolver, report: Report) -> Document:
     glTF version other than 2.
     """
     source = resolver.source
-    content = resolver.read()
-    text, binary = memoryview(content), None
-    if not content:
+    text, binary = resolver.read_view(), None
+    if not text:
         raise InputError(source, "empty file; want a glTF 2.0 file")
-    if content[:4] == _GLB_MAGIC:
+    if text[:4] == _GLB_MAGIC:
         text, binary = _glb_chunks(text, source, report)
     try:
-        data = json.loads(str(text, "utf-8-sig"))
+        data = json.loads(str(text, "utf-8").removeprefix("\ufeff"))
     except UnicodeDecodeError as error:
         raise InputError(source, f"not UTF-8 at byte {error.start}; want glTF JSON") from error
     except json.JSONDecodeError as error:

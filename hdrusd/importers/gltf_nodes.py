@@ -16,6 +16,9 @@ from hdrusd.report import Kind
 #: Off by more than this, a quaternion was not meant to be of length 1; below it is rounding.
 _UNIT_TOLERANCE = 1e-3
 
+#: Where a node is, but for a matrix.
+_PLACEMENT = frozenset({"translation", "rotation", "scale"})
+
 
 class NodeReader:
     """Makes the nodes of one scene.
@@ -133,7 +136,7 @@ def _parents(items: list[Item], children: list[list[int]]) -> dict[int, int]:
 
 
 def _trs(item: Item) -> TRS | None:
-    if not ({"translation", "rotation", "scale"} & set(item.data)):
+    if _PLACEMENT.isdisjoint(item.data):
         return None
     x, y, z = item.numbers("translation", (0.0, 0.0, 0.0))
     sx, sy, sz = item.numbers("scale", (1.0, 1.0, 1.0))
@@ -157,7 +160,7 @@ def _rotation(item: Item) -> tuple[float, float, float, float]:
 
 def _matrix(item: Item) -> npt.NDArray[np.float64]:
     """(4, 4) for row vectors: glTF's column-major matrix for columns is that, read by rows."""
-    if {"translation", "rotation", "scale"} & set(item.data):
+    if not _PLACEMENT.isdisjoint(item.data):
         text = "matrix beside translation, rotation or scale; the matrix is used"
         item.note(Kind.INVALID, "node-matrix", text)
     identity = tuple(np.eye(4).reshape(-1).tolist())

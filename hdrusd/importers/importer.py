@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Protocol
+
+import numpy as np
 
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.importers.cycle_search import put_off
@@ -53,6 +56,19 @@ class Resolver:
     def read(self, path: Path | None = None) -> bytes:
         """The bytes of ``path``, or of the source itself. Raises InputError."""
         path = self.source if path is None else path
+        with self._opening(path):
+            return path.read_bytes()
+
+    def read_view(self, path: Path | None = None) -> memoryview:
+        """As ``read``, into memory of large pages, where NumPy is given some: half the time."""
+        path = self.source if path is None else path
+        with self._opening(path) as size, path.open("rb") as file:
+            content = np.empty(size, np.uint8).data
+            return content[: file.readinto(content)]
+
+    @contextmanager
+    def _opening(self, path: Path) -> Iterator[int]:
+        """The size of a regular file that is about to be read; InputError for what goes wrong."""
         try:
             if not path.exists():
                 raise InputError(path, "no such file")
@@ -61,7 +77,7 @@ class Resolver:
             size = path.stat().st_size
             if size > self.limits.file_bytes:
                 raise InputError(path, f"{size} bytes; at most {self.limits.file_bytes} are read")
-            return path.read_bytes()
+            yield size
         except OSError as problem:  # no permission, a broken disk
             raise InputError(
                 path, f"cannot be read: {problem.strerror or problem}; want a readable file"
