@@ -138,8 +138,12 @@ def bench_folder(count: int, side: int, runs: int, folder: Path) -> list[str]:
     textures = [Texture(Image(name.name, place, path=name)) for name in names]
     program = Path(oiio.__file__).parent / "bin" / "oiiotool"
 
+    def fresh() -> Path:
+        """What stands in an earlier one is not written over, for which file systems wait."""
+        return Path(tempfile.mkdtemp(dir=folder))
+
     def ours(*, looks: bool) -> None:
-        maps = MapWriter(folder / "maps", "maps", Report())
+        maps = MapWriter(fresh(), "maps", Report())
         with maps.threaded(texture.image for texture in textures):
             for texture in textures:
                 maps.reflectance(texture, COLOR, 2.2, place, "paint")
@@ -147,10 +151,10 @@ def bench_folder(count: int, side: int, runs: int, folder: Path) -> list[str]:
                     maps.look(texture)
 
     def theirs() -> None:
-        factors = ",".join(map(str, COLOR))
+        factors, made = ",".join(map(str, COLOR)), fresh()
         for name in names:
             change = ["--powc", "2.2", "--mulc", factors, "-d", "half"]
-            target = folder / f"{name.stem}.exr"
+            target = made / f"{name.stem}.exr"
             subprocess.run([program, name, *change, "-o", target], check=True)
 
     found = measure(
