@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 import traceback
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from types import FrameType
 
 import click
 
@@ -102,10 +104,25 @@ def hdrusd() -> None:
     """Photometric night rendering of LDR 3D databases on OpenUSD."""
 
 
+def interrupt(number: int, frame: FrameType | None) -> None:
+    """Ctrl-C. Inside an import, which USD's libraries go on with all the same, a moment later."""
+    inside = frame
+    while inside is not None and inside.f_code is not main.__code__:
+        if inside.f_code.co_filename.startswith("<frozen importlib"):
+            again = threading.Timer(0.05, signal.pthread_kill, [threading.get_ident(), number])
+            again.daemon = True
+            again.start()
+            return
+        inside = inside.f_back
+    signal.default_int_handler(number, frame)
+
+
 def main() -> None:
     """Entry point: run, and turn what goes wrong into one line and an exit code."""
     # A scheduler's SIGTERM is a Ctrl-C: what is half done is cleared away.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, interrupt)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # of nohup it is ignored
+        signal.signal(signal.SIGINT, interrupt)
     try:
         code = hdrusd.main(prog_name="hdrusd", standalone_mode=False)
     except click.ClickException as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -220,3 +221,34 @@ def test_closed_pipe_is_no_error(stage: Path) -> None:
         check=False,
     )
     assert run.stderr == ""
+
+
+_SWALLOWS = """
+import os, signal, time
+try:
+    os.kill(os.getpid(), signal.{name})
+    time.sleep(0.02)
+except KeyboardInterrupt:
+    print("swallowed")
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_interrupt_inside_an_import_comes_after_it(tmp_path: Path, name: str) -> None:
+    """USD's libraries import Python modules of theirs, and go on where one of these fails."""
+    (tmp_path / "swallows.py").write_text(_SWALLOWS.format(name=name))
+    lines = [
+        "import sys, time",
+        "sys.path.insert(0, sys.argv.pop())",
+        "from hdrusd.cli.main import hdrusd, main",
+        "hdrusd.get_command = lambda *_: (__import__('swallows'), time.sleep(30))",
+        "main()",
+    ]
+    job = subprocess.run(
+        [sys.executable, "-c", "\n".join(lines), "doctor", tmp_path],
+        capture_output=True,
+        text=True,
+        timeout=25,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    assert (job.returncode, job.stdout, job.stderr.strip()) == (130, "", "interrupted")
