@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
 
 import click
 
-from .options import FILE, NumberRange, finish, report_options, tell, write_report
+from .options import FILE, NumberRange, conclude, report_options
 
 
 def _numbers(text: str, option: str) -> list[float]:
@@ -95,14 +94,8 @@ def command(images: tuple[Path, ...], output: Path, **options: Any) -> None:
     report = Report()
     done = merge_bracket(bracket, report)
     document = report.as_dict() | done
-    if options["report_file"] is not None:
-        write_report(options["report_file"], document)
-    tell(report, options["quiet"])
-    if options["as_json"]:
-        click.echo(json.dumps(document))
-    else:
-        click.echo(f"{output}: {done['width']} x {done['height']}, peak {done['peak']:.4g} cd/m2")
-    finish(report, options["strict"])
+    line = f"{output}: {done['width']} x {done['height']}, peak {done['peak']:.4g} cd/m2"
+    conclude(report, document, [line], options)
 
 
 def _asked(images: tuple[Path, ...], output: Path, options: dict[str, Any]) -> Any:

@@ -7,7 +7,7 @@ import math
 import re
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -221,6 +221,21 @@ def finish(report: Report, strict: bool) -> None:
     """Exit with STRICT where findings are not wanted."""
     if strict and len(report):
         sys.exit(STRICT)
+
+
+def conclude(
+    report: Report, document: dict[str, Any], lines: Iterable[str], options: Mapping[str, Any]
+) -> None:
+    """The end of a command with ``report_options`` and ``--json``.
+
+    ``lines``, or with ``--json`` the ``document``, go to standard output.
+    """
+    if options["report_file"] is not None:
+        write_report(options["report_file"], document)
+    tell(report, options["quiet"])
+    for line in [json.dumps(document)] if options["as_json"] else lines:
+        click.echo(line)
+    finish(report, options["strict"])
 
 
 def list_profiles(profiles: Mapping[str, Mapping[str, Any]]) -> None:

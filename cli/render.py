@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 import time
@@ -29,12 +28,10 @@ from .options import (
     FILE,
     NumberRange,
     chosen_operator,
-    finish,
+    conclude,
     operator_options,
     parse_settings,
     report_options,
-    tell,
-    write_report,
 )
 
 #: usdrecord's names and numbers of --complexity, and how often they refine.
@@ -220,15 +217,7 @@ def command(stage: Path, output: str, **options: Any) -> None:
         "seconds": round(time.perf_counter() - started, 3),
     }
     document |= flicker_of(job.log if in_time else None)
-    if options["report_file"] is not None:
-        write_report(options["report_file"], document)
-    tell(report, options["quiet"])
-    if options["as_json"]:
-        click.echo(json.dumps(document))
-    else:
-        for file in written:
-            click.echo(file)
-    finish(report, options["strict"])
+    conclude(report, document, written, options)
 
 
 def _job(stage: Path, output: str, options: dict[str, Any]) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from pathlib import Path
@@ -28,12 +27,10 @@ from .eye_options import (
 from .options import (
     NumberRange,
     chosen_operator,
-    finish,
+    conclude,
     operator_options,
     parse_settings,
     report_options,
-    tell,
-    write_report,
 )
 
 
@@ -116,15 +113,7 @@ def command(source: str, output: str, **options: Any) -> None:
     }
     in_time = showing.viewing.operator.advance is not None and not showing.stills
     document |= flicker_of(showing.log if in_time else None)
-    if options["report_file"] is not None:
-        write_report(options["report_file"], document)
-    tell(report, options["quiet"])
-    if options["as_json"]:
-        click.echo(json.dumps(document))
-    else:
-        for name in written:
-            click.echo(name)
-    finish(report, options["strict"])
+    conclude(report, document, written, options)
 
 
 def _showing(output: str, first: float, options: dict[str, Any]) -> Any:
