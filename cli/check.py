@@ -20,9 +20,9 @@ from .options import FILE, STRICT, tell
 @click.option("--strict", is_flag=True, help=f"Exit with {STRICT} on warnings too.")
 def command(stage: Path, as_json: bool, strict: bool) -> None:
     """Validate STAGE: units, light intensities, reflectances, sky."""
+    from hdrusd.checking import validate
     from hdrusd.report import Report
     from hdrusd.usd.opening import open_stage, usd_warnings
-    from hdrusd.validation import validate
 
     report = Report()
     opened = open_stage(stage, report=report)

@@ -27,11 +27,22 @@ STRICT = 6
 #: Findings told on the terminal, those with the same words once; the rest is in the report.
 _SHOWN = 20
 
+
+class Named(click.Path):
+    """A path that a name says; "-" is no stream here, and nothing is not the folder we are in."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The path. Raises BadParameter."""
+        if str(value) in ("", "-"):
+            self.fail(f"{str(value)!r} is no name of a file; want one.", param, ctx)
+        return super().convert(value, param, ctx)
+
+
 #: Whoever reads the file says that it cannot be read, with the exit code for that.
-FILE = click.Path(path_type=Path, dir_okay=False, readable=False)
-FOLDER = click.Path(path_type=Path, file_okay=False, exists=True)
+FILE = Named(path_type=Path, dir_okay=False, readable=False)
+FOLDER = Named(path_type=Path, file_okay=False, exists=True)
 #: A file or a folder.
-PLACE = click.Path(path_type=Path, readable=False)
+PLACE = Named(path_type=Path, readable=False)
 
 
 class NumberRange(click.FloatRange):

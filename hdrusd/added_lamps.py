@@ -8,7 +8,7 @@ units) or nodes (``match``, with ``offset`` in their own space), and says all th
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from hdrusd.errors import SourceRef
 from hdrusd.legacy.scene import TRS, LegacyScene, Light, Node, Vec3
+from hdrusd.photometry.recipe_keys import is_strong, note_weak
 from hdrusd.photometry.sidecar import Rule, Sidecar
 from hdrusd.photometry.spread import SHAPES
 from hdrusd.report import Kind, Report
@@ -31,10 +32,17 @@ _OFF = 1.0
 _MOST = 100_000
 
 
-def add_lamps(scene: LegacyScene, sidecar: Sidecar, up: str, report: Report) -> dict[int, Rule]:
+def add_lamps(
+    scene: LegacyScene,
+    sidecar: Sidecar,
+    up: str,
+    file_of: Callable[[Rule], object | None],
+    report: Report,
+) -> dict[int, Rule]:
     """Hang the lamps into ``scene``; the rule of each new light by its index.
 
-    ``up``: "Y" or "Z", against which lamps without an axis shine.
+    ``up``: "Y" or "Z", against which lamps without an axis shine. ``file_of``: what a
+    rule's photometric file has; a lamp is not placed whose only strength is one that has nothing.
     """
     rules: dict[int, Rule] = {}
     aimed: dict[int, list[Rule]] = {}  # by the ids of their nodes, which may be turned
@@ -42,25 +50,32 @@ def add_lamps(scene: LegacyScene, sidecar: Sidecar, up: str, report: Report) -> 
     for rule in sidecar.rules:
         if rule.section != "lamp":
             continue
+        places = rule.values.get("at", ())
+        named = [node for node in nodes if rule.fits((node.name,))] if _of_nodes(rule) else []
+        rule.matched = bool(places or named)
+        if not rule.matched:
+            continue
+        if not is_strong(rule.values.keys() - {"ies"}) and file_of(rule) is None:
+            note_weak(rule.place, report)
+            continue
         index = len(scene.lights)
         scene.lights.append(_light(rule, up))
         rules[index] = rule
-        places = rule.values.get("at", ())
         if places:
             holder = Node(_name(rule), rule.place)
             holder.children = [_stand(rule, index, place) for place in places]
             scene.roots.append(holder)
-            rule.matched = True
-        if "match" in rule.values:
-            for node in nodes:
-                if rule.fits((node.name,)):
-                    node.lights.append(index)
-                    rule.matched = True
-                    if "axis" not in rule.values and _has_a_way(rule):
-                        aimed.setdefault(id(node), []).append(rule)
+        for node in named:
+            node.lights.append(index)
+            if "axis" not in rule.values and _has_a_way(rule):
+                aimed.setdefault(id(node), []).append(rule)
     if aimed:
         _note_turned(scene, aimed, np.array(_down(up)), report)
     return rules
+
+
+def _of_nodes(rule: Rule) -> bool:
+    return "match" in rule.values
 
 
 def _has_a_way(rule: Rule) -> bool:
@@ -106,7 +121,7 @@ def _light(rule: Rule, up: str) -> Light:
         _name(rule),
         SourceRef(rule.place.file, rule.place.place),
         "point" if cutoff is None else "spot",
-        position=(rule.three("offset") or (0.0, 0.0, 0.0)) if "match" in rule.values else (0, 0, 0),
+        position=(rule.three("offset") or (0.0, 0.0, 0.0)) if _of_nodes(rule) else (0, 0, 0),
         direction=rule.three("axis") or _down(up),
         spot_cutoff=_EVERYWHERE if cutoff is None else cutoff,
     )

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hdrusd.account.fix_first import Scene, fix_first
+from hdrusd.account.fix import Scene
+from hdrusd.account.fix_first import fix_first
 from hdrusd.account.totals import totals
 from hdrusd.importers.importer import Limits
 from hdrusd.photometry.estimate import DEFAULT_RULE
@@ -68,6 +69,7 @@ class Result:
             self.unit_stated,
             self.source.stem if self.source else "",
         )
+        named = {file: {"image": row["name"]} for row in self.images for file in row["files"]}
         return document | {
             "output": str(self.output),
             "counts": self.counts,
@@ -76,5 +78,5 @@ class Result:
             "lights": self.lights,
             "materials": self.materials,
             "images": self.images,
-            "textures": self.textures,
+            "textures": {file: made | named.get(file, {}) for file, made in self.textures.items()},
         }

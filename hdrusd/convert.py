@@ -14,6 +14,7 @@ from hdrusd.account.images import image_rows
 from hdrusd.account.reflectances import Reflectances
 from hdrusd.account.wear import wearers, worn
 from hdrusd.added_lamps import add_lamps
+from hdrusd.checking import validate
 from hdrusd.conversion import Options, Result
 from hdrusd.delivery import check_output, check_path, move_into_place, work_folder
 from hdrusd.errors import InputError, SourceRef, ValidationError
@@ -24,6 +25,7 @@ from hdrusd.lamps import LampMaker, temperature_rgb
 from hdrusd.legacy import scene as legacy
 from hdrusd.luminaires import LuminaireFiles
 from hdrusd.maps import MapWriter
+from hdrusd.measures import Measures, stated_measures
 from hdrusd.overlay.stage import Overlay
 from hdrusd.photometry.estimate import RULES
 from hdrusd.photometry.interpret import Interpreter
@@ -31,17 +33,16 @@ from hdrusd.photometry.lamp_area import LampArea
 from hdrusd.photometry.sidecar import FILE_NAME, Rule, Sidecar, read_sidecar
 from hdrusd.report import Kind, Report
 from hdrusd.skies import SkyFiles
-from hdrusd.surfaces import SurfaceMaker, colored_materials, material_rows
+from hdrusd.surfaces import SurfaceMaker, colored_materials, faded_materials, material_rows
 from hdrusd.usd.authorship import authorship_inputs, write_authorship
 from hdrusd.usd.material import Surface, write_look, write_photometric
-from hdrusd.usd.mesh import COLOR_PRIMVAR
-from hdrusd.usd.placed import area_scales, extents
+from hdrusd.usd.placed import extents, mesh_areas
+from hdrusd.usd.placed_area import PlacedArea
 from hdrusd.usd.settings import Settings
 from hdrusd.usd.source_stage import STAGES
 from hdrusd.usd.tree import Place
 from hdrusd.usd.worn_area import LampAreas
 from hdrusd.usd.writer import StageWriter
-from hdrusd.validation import validate
 
 #: Suffixes of a stage that convert writes: text at the top, so that a person can read it.
 OUTPUT_SUFFIXES = (".usda",)
@@ -79,19 +80,21 @@ class _Conversion:
         self.report = report
         self.sidecar = _find_sidecar(source, options, report)
         resolver = Resolver(source, report, options.roots, options.search, options.limits)
+        resolver.stated = _stated(options, self.sidecar)
         self.scene = read_legacy(resolver, report)
+        self.stated = _measures(self.scene, options, self.sidecar, report)
         self.result = Result(
             output, report, self.scene.counts(), source=source, parts=resolver.found
         )
-        up = options.up or self.sidecar.up or self.scene.up
-        self.added = add_lamps(self.scene, self.sidecar, up, report)
+        up = self.stated.up or self.scene.up
         stem = output.stem
         files = folder / f"{stem}.textures", f"./{stem}.textures"
-        self.maps = MapWriter(*files, report)
+        self.maps = MapWriter(*files, source.resolve().parent, report)
         named = Resolver(
             self.sidecar.path or source, report, options.roots, options.search, options.limits
         )
         self.luminaires = LuminaireFiles(*files, named, report)
+        self.added = add_lamps(self.scene, self.sidecar, up, self.luminaires.use, report)
         self.skies = SkyFiles(*files, report)
         self.writer = StageWriter(
             folder,
@@ -99,7 +102,7 @@ class _Conversion:
             self.scene,
             report,
             meters_per_unit=options.meters_per_unit,
-            source_unit=options.source_unit or self.sidecar.unit_m or self.scene.unit_m,
+            source_unit=self.stated.unit_m or self.scene.unit_m,
             up=up,
         )
         self.surfaces: list[Surface] = []
@@ -136,6 +139,7 @@ class _Conversion:
             raise InputError(self.scene.source, "nothing in it that can be used; see the findings")
         camera = self._write_cameras()
         self._show_nodes()
+        lamps.count_shown()
         lamps.free()
         self._account()
         self.writer.write_settings(
@@ -152,13 +156,14 @@ class _Conversion:
 
     def _write_materials(self, interpreter: Interpreter) -> None:
         materials = self.scene.materials
-        colored = colored_materials(self.scene)
+        colored, faded = colored_materials(self.scene), faded_materials(self.scene)
         maker = SurfaceMaker(self.maps, interpreter, self.sidecar, self.options.gamma, self.report)
         glossed = [maker.glossed(material) for material in materials]
         surfaces = [
             maker.surface(
                 m,
                 colored=i in colored,
+                faded=i in faded,
                 area=partial(self._lamp_area, i),
                 places=partial(self._lamp_places, i),
             )
@@ -167,10 +172,9 @@ class _Conversion:
         self.surfaces = surfaces
 
         def look(stage: Usd.Stage, index: int, path: Sdf.Path) -> None:
-            maps = maker.look(materials[index])
-            write_look(
-                stage, path, materials[index], maps, COLOR_PRIMVAR if index in colored else ""
-            )
+            maps, surface = maker.look(materials[index]), surfaces[index]
+            primvars = surface.vertex_color, surface.vertex_opacity
+            write_look(stage, path, materials[index], maps, *primvars)
 
         def photometric(stage: Usd.Stage, index: int, path: Sdf.Path) -> None:
             write_photometric(stage, path, glossed[index], surfaces[index])
@@ -190,10 +194,10 @@ class _Conversion:
         return LampAreas(writer.stage, self.scene, *placed, self._wearers)
 
     @cached_property
-    def _scales(self) -> dict[int, float]:
+    def _placed_areas(self) -> dict[int, PlacedArea]:
         """Of the meshes before the photometry file shows and hides nodes."""
         writer = self.writer
-        return area_scales(writer.stage, writer.meshes, writer.tree.copies)
+        return mesh_areas(writer.stage, writer.meshes, writer.tree.copies)
 
     def _lamp_area(self, material: int) -> LampArea | None:
         return self._lamp_areas.of(material)
@@ -202,7 +206,7 @@ class _Conversion:
         materials = list(self.scene.materials)
         materials[material] = replace(materials[material], diffuse_map=texture)
         scene = replace(self.scene, materials=materials)
-        return worn(scene, self._scales, material, self._wearers.get(material, ())).uv
+        return worn(scene, self._placed_areas, material, self._wearers.get(material, ())).uv
 
     # -- cameras, nodes, checks ------------------------------------------------------------
 
@@ -229,17 +233,18 @@ class _Conversion:
         result, stage = self.result, self.writer.stage
         result.textures = self.maps.written | self.luminaires.written | self.skies.written
         result.diagonal, result.ground = extents(stage)
-        result.unit_stated = bool(self.options.source_unit or self.sidecar.unit_m)
-        scales = area_scales(stage, self.writer.meshes, self.writer.tree.copies)
+        result.unit_stated = self.stated.unit_m is not None
+        placed = mesh_areas(stage, self.writer.meshes, self.writer.tree.copies)
         judge = Reflectances(self.maps.overview, self.report)
         pairs = zip(self.scene.materials, self.surfaces, result.materials, strict=True)
         for index, (material, surface, row) in enumerate(pairs):
             file = surface.diffuse_map.file.rpartition("/")[2] if surface.diffuse_map else ""
             factor = cast("list[float] | None", self.maps.written.get(file, {}).get("diffuse"))
-            found = worn(self.scene, scales, index, self._wearers.get(index, ()))
+            found = worn(self.scene, placed, index, self._wearers.get(index, ()))
             row |= judge.row(material, surface, found, factor)
         areas = [row["area_m2"] for row in result.materials]
-        result.images = image_rows(self.scene.materials, self.surfaces, areas, result.textures)
+        made_of, broken = self.maps.made_of, self.maps.broken
+        result.images = image_rows(self.scene.materials, self.surfaces, areas, made_of, broken)
 
     def _validate(self) -> None:
         stage = Usd.Stage.Open(str(self.folder / self.output.name))
@@ -258,6 +263,23 @@ def _find_sidecar(source: Path, options: Options, report: Report) -> Sidecar:
     if options.photometry is None and not path.is_file():
         return Sidecar()
     return read_sidecar(path, report)
+
+
+def _stated(options: Options, sidecar: Sidecar) -> frozenset[str]:
+    """What a person states where a format leaves it open."""
+    said = {"unit": options.source_unit or sidecar.unit_m, "up": options.up or sidecar.up}
+    return frozenset(key for key, value in said.items() if value)
+
+
+def _measures(
+    scene: legacy.LegacyScene, options: Options, sidecar: Sidecar, report: Report
+) -> Measures:
+    own = Measures(
+        scene.unit_m if scene.unit_stated else None, scene.up if scene.up_stated else None
+    )
+    asked = Measures(options.source_unit, options.up)
+    place = SourceRef(scene.source)
+    return stated_measures(own, asked, sidecar, place, report, shared=options.shared)
 
 
 def _node_camera(place: Place, rule: Rule) -> legacy.Camera:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import fcntl
 import os
+import re
 import unicodedata
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -18,6 +19,14 @@ _ASIDE = "replaced"
 
 #: Bytes in the name of a file, as common file systems have it.
 _LONGEST_NAME = 255
+
+#: What may stand beside OUTPUT: its stem, a point, and one of these. The layers, then a folder.
+_LAYERS = _GEOMETRY, _LOOK, _PHOTOMETRY = "geometry.usdc", "look.usda", "photometry.usda"
+_TEXTURES = "textures"
+
+#: What stands in the head of the layer that is always there.
+_MARK, _HEAD = b'authorship:hdrusd:softwarePackage = "hdrusd"', 1 << 16
+_EMPTY = b"#usda 1.0"
 
 
 def check_path(path: Path) -> None:
@@ -35,13 +44,84 @@ def check_output(output: Path, suffixes: Sequence[str]) -> None:
         raise InputError(output, f"{output.suffix or 'no suffix'}; want {suffixes[0]}")
     if output.is_dir():
         raise InputError(output, "a folder; want the name of a file")
-    longest = f"{output.stem}.photometry.usda"
+    longest = f"{output.stem}.{_PHOTOMETRY}"
     if len(longest.encode()) > _LONGEST_NAME:
         raise InputError(output, f"a name of {len(output.name)} characters; want a shorter one")
-    textures = output.parent / f"{output.stem}.textures"
+    textures = output.with_name(f"{output.stem}.{_TEXTURES}")
     if textures.exists() and not (output.exists() and output.with_name(longest).exists()):
-        # It would be replaced, and may well be the source's own.
-        raise InputError(textures, "not of an earlier conversion; want another name for OUTPUT")
+        raise _foreign(textures)  # it would be replaced, and may well be the source's own
+    for layer in places(output)[1:-1]:
+        if layer.is_dir():
+            raise _foreign(layer)
+
+
+def _foreign(place: Path) -> InputError:
+    return InputError(place, "not of an earlier conversion; want another name for OUTPUT")
+
+
+def places(output: Path) -> list[Path]:
+    """Where a conversion into ``output`` may write."""
+    return [output, *(output.with_name(f"{output.stem}.{part}") for part in (*_LAYERS, _TEXTURES))]
+
+
+def is_own(file: Path) -> bool:
+    """Whether a conversion wrote this stage, or this layer of one: converting it once more would
+    take reflectance for pictures, and each run would find more.
+    """
+    stem = file.stem if file.suffix == ".usda" else ""
+    for layer in _LAYERS:
+        if file.name.endswith(f".{layer}"):
+            stem = file.name.removesuffix(f".{layer}")
+    return bool(stem) and _is_converted(file.with_name(f"{stem}.usda"))
+
+
+def _is_converted(output: Path) -> bool:
+    """Whether the layers of a stage of this name are of a conversion into it."""
+    photometry = output.with_name(f"{output.stem}.{_PHOTOMETRY}")
+    try:
+        said = _head(photometry)
+        if said.strip() == _EMPTY:  # over a stage without lights and materials
+            return _named(photometry.name) in _head(output)
+    except OSError:
+        return False
+    return _MARK in said
+
+
+def earlier_files(output: Path) -> list[Path]:
+    """The files of the conversion that stands at ``output``; none where somebody else's does.
+
+    They are those that its layers name: what else lies among its textures is not its own.
+    """
+    if not _is_converted(output):
+        return []
+    layers = {layer: output.with_name(f"{output.stem}.{layer}") for layer in _LAYERS}
+    try:
+        root = _head(output)
+        # A stage that stayed as it is may have the name of one of them, and hardly of both.
+        if not all(_named(path.name) in root for path in layers.values()):
+            layers = {_PHOTOMETRY: layers[_PHOTOMETRY]}
+        found = [path for path in layers.values() if path.is_file() and not path.is_symlink()]
+        text = b"".join(path.read_bytes() for path in found if path.suffix == ".usda")
+    except OSError:
+        return []
+    folder = output.with_name(f"{output.stem}.{_TEXTURES}")
+    if not folder.is_symlink():  # what lies elsewhere stays
+        named = re.findall(re.escape(_named(f"{folder.name}/")[:-1]) + rb"([^@/\n]+)@", text)
+        textures = (folder / name.decode(errors="surrogateescape") for name in sorted({*named}))
+        found += [path for path in textures if path.is_file()]
+    return [*found, output] if root else found
+
+
+def _named(path: str) -> bytes:
+    """As a layer names what stands beside it."""
+    return f"@./{path}@".encode(errors="surrogateescape")
+
+
+def _head(file: Path) -> bytes:
+    if file.is_symlink() or not file.is_file():  # a pipe would never end
+        return b""
+    with file.open("rb") as opened:
+        return opened.read(_HEAD)
 
 
 @contextmanager
@@ -74,8 +154,7 @@ def work_folder(output: Path) -> Iterator[Path]:
         clear_leftovers(output, done=True)
     finally:
         for parent in made:
-            with suppress(OSError):  # it is not there, or not empty
-                parent.rmdir()
+            _clear(parent)
 
 
 def _beside(output: Path) -> Path:
@@ -93,8 +172,7 @@ def clear_leftovers(output: Path, *, done: bool) -> None:
     Who died between two renames has set an earlier stage aside; nobody else has it. It stays
     until a run over that output is ``done`` and has replaced it.
     """
-    parts = ("geometry.usdc", "look.usda", "photometry.usda", "textures")
-    own = {output.name, *(f"{output.stem}.{part}" for part in parts)}
+    own = {path.name for path in places(output)}
     for path in left_behind(output.parent):
         aside = {each.name for each in (path / _ASIDE).glob("*")}
         if not aside or (done and aside <= own):
@@ -111,8 +189,9 @@ def _refused(output: Path, problem: OSError) -> OSError:
 def move_into_place(folder: Path, output: Path) -> None:
     """Rename what was made; the root layer last, so that it never names what is not there.
 
-    What stood there before is set aside, and put back when a rename fails. Of two runs at once
-    one waits for the other, or parts of both would stand there.
+    What stood there before is set aside, and put back when a rename fails; of an earlier
+    conversion into ``output`` all of it, but nothing that hdrusd did not write. Of two runs at
+    once one waits for the other, or parts of both would stand there.
     """
     with _turn(output.parent):
         _rename_all(folder, output)
@@ -130,23 +209,46 @@ def _turn(folder: Path) -> Iterator[None]:
 
 
 def _rename_all(folder: Path, output: Path) -> None:
-    names = sorted((p.name for p in folder.iterdir()), key=lambda name: name == output.name)
-    old = folder / _ASIDE
-    old.mkdir()
-    touched: list[str] = []
+    """File by file: others' files may lie in the folder of textures."""
+    home, old = output.parent, folder / _ASIDE
+    made = [path.relative_to(folder) for path in folder.rglob("*") if not path.is_dir()]
+    made.sort(key=lambda way: (way.name == output.name, len(way.parts) == 1, way))
+    new = set(made)
+    earlier = earlier_files(output)
+    for way in made:
+        layer = home / way
+        if len(way.parts) == 1 and layer != output and layer.exists() and layer not in earlier:
+            raise _foreign(layer)
+    before = (path.relative_to(home) for path in earlier)
+    gone = [way for way in before if way not in new]
+    inner = {way.parent for way in (*made, *gone)} - {Path()}
+    linked = [way for way in inner if (home / way).is_symlink()]  # what lies elsewhere stays there
+    touched: list[Path] = []
     try:
-        for name in names:
-            touched.append(name)
-            target = output.parent / name
+        for way in (*linked, *made, *gone):
+            touched.append(way)
+            target, aside = home / way, old / way
+            target.parent.mkdir(exist_ok=True)
             if target.exists():
-                target.rename(old / name)
-            (folder / name).rename(target)
+                aside.parent.mkdir(parents=True, exist_ok=True)
+                target.rename(aside)
+            if way in new:
+                (folder / way).rename(target)
     except BaseException:
-        for name in reversed(touched):
-            target = output.parent / name
+        for way in reversed(touched):
+            target, aside = home / way, old / way
             with suppress(OSError):  # the others are put back all the same
-                if not (folder / name).exists() and target.exists():
-                    target.rename(folder / name)
-                if (old / name).exists():
-                    (old / name).rename(target)
+                if way in new and not (folder / way).exists() and target.exists():
+                    target.rename(folder / way)
+                if aside.exists():
+                    _clear(target)  # a folder in place of a link
+                    aside.rename(target)
         raise
+    finally:
+        for way in inner:
+            _clear(home / way)
+
+
+def _clear(folder: Path) -> None:
+    with suppress(OSError):  # it is not there, or not empty
+        folder.rmdir()

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import mmap
 import os
+import re
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -37,6 +39,18 @@ _PIXELS_A_BYTE = 10_000
 #: The last chunk's name and checksum (PNG, ISO/IEC 15948, 11.2.5).
 _PNG_END = b"IEND\xaeB`\x82"
 
+#: The first bytes of a JPEG, and its next marker with a meaning of its own: neither a stuffed
+#: byte of entropy-coded data, a restart nor a fill byte (ITU-T T.81, B.1.1).
+_JPEG = b"\xff\xd8\xff"
+_JPEG_MARKER = re.compile(rb"\xff[\x02-\xcf\xd9-\xfe]")
+_JPEG_SCAN, _JPEG_END = b"\xff\xda", b"\xff\xd9"
+
+#: Segments of a JPEG that are gone through; an ICC profile has up to 255.
+_JPEG_SEGMENTS = 65536
+
+#: What libjpeg warns of where it makes texels up, in small letters.
+_MADE_UP = ("premature end", "bad huffman code", "instead of rst")
+
 #: libpng's PNG_FILTER_SUB: each byte less that of the pixel to the left.
 _PNG_SUB = 16
 
@@ -56,6 +70,9 @@ _PQ = (9, 16, 0, 1)
 #: What OpenImageIO calls pictures of six sides, which it lays out in one.
 _OTHER_LAYOUTS = ("CubeFace Environment", "CubeFace Shadow")
 
+#: Formats in which a channel's name says what it holds; those of others go by their number.
+_NAMED_CHANNELS = ("openexr", "dds")
+
 #: The largest finite half float.
 HALF_MAX = 65504.0
 
@@ -65,7 +82,9 @@ def read_image(path: Path, data: bytes | None = None) -> ImageData:
 
     ``data``: the encoded bytes, when the file lies in a package or another file;
     ``path`` then only names it. 16-bit integers come back as float32 in [0, 1].
-    Colours are as the file has them, not multiplied by alpha. Raises InputError.
+    Two channels are grey and alpha, four are colour and alpha: of a file with more, or others,
+    what is neither is ``dropped``, and a colour of two has no third. Colours are as the file has
+    them, not multiplied by alpha. Raises InputError, also for a JPEG that is not whole.
     """
     found = read_small_image(path, data, MAX_PIXELS)
     assert found is not None  # more pixels are refused
@@ -97,15 +116,94 @@ def _decode(real: Path, named: Path, most: int) -> ImageData | None:
             raise InputError(named, "a cube or a volume of pictures; want one picture")
         if spec.width * spec.height > most:
             return None
-        kind = {"uint8": oiio.UINT8, "half": oiio.HALF}.get(str(spec.format), oiio.FLOAT)
-        channels = min(spec.nchannels, 4)
-        pixels = picture.read_image(0, 0, 0, channels, kind)
-        if pixels is None:
-            raise InputError(named, f"broken image ({_first_line(picture.geterror())})")
-        array = np.asarray(pixels).reshape(spec.height, spec.width, channels)
-        return ImageData(array, named, integers="int" in str(spec.format))
+        if not jpeg_ends(real):
+            raise InputError(named, "broken image (JPEG data without an end); want a whole file")
+        channels = _channels(spec, picture.format_name())
+        array = _pixels(picture, spec, channels, named)
+        dropped = _others([n for i, n in enumerate(spec.channelnames) if i not in channels])
+        return ImageData(array, named, integers="int" in str(spec.format), dropped=dropped)
     finally:
         picture.close()
+
+
+def _pixels(
+    picture: oiio.ImageInput, spec: oiio.ImageSpec, channels: list[int | None], named: Path
+) -> npt.NDArray[np.generic]:
+    """Those channels, (h, w, n); zeros for None. Raises InputError."""
+    kind = {"uint8": oiio.UINT8, "half": oiio.HALF}.get(str(spec.format), oiio.FLOAT)
+
+    def read(first: int, count: int) -> npt.NDArray[np.generic]:
+        pixels = picture.read_image(0, 0, first, first + count, kind)
+        said = picture.geterror()
+        if pixels is None or made_up(said):
+            why = _first_line(said).partition(' ("')[0]  # libjpeg ends with a name, perhaps ours
+            raise InputError(named, f"broken image ({why})")
+        array: npt.NDArray[np.generic] = np.asarray(pixels).reshape(spec.height, spec.width, count)
+        return array
+
+    if channels == list(range(len(channels))):
+        return read(0, len(channels))
+    planes = {channel: read(channel, 1) for channel in channels if channel is not None}
+    nothing = np.zeros_like(next(iter(planes.values())))
+    return np.concatenate([nothing if c is None else planes[c] for c in channels], axis=-1)
+
+
+def _channels(spec: oiio.ImageSpec, form: str) -> list[int | None]:
+    """Which channels are the colour, one or three, and alpha if there is one; None: a black one.
+
+    The colour is that of the first layer.
+    """
+    names = [name.lower() for name in spec.channelnames]
+    layer = names[0].rpartition(".")[0]
+    within = {name.removeprefix(f"{layer}."): i for i, name in reversed([*enumerate(names)])}
+    alpha: int | None = within.get("a", within.get("alpha"))
+    if alpha is None and form not in _NAMED_CHANNELS and 0 <= spec.alpha_channel < len(names):
+        alpha = spec.alpha_channel
+    if len(names) == 2 and form not in _NAMED_CHANNELS:
+        return [0, 1] if form != "tiff" or alpha == 1 else [0]  # OpenImageIO may say R and G
+    color: list[int | None] = [within.get(letter) for letter in "rgb"]
+    known = sum(channel is not None for channel in color)
+    if known < 2:
+        apart = alpha, spec.z_channel if "x" not in within else None  # a vector's Z is no depth
+        others = [i for i in range(len(names)) if i not in apart] or [0]
+        color = [*others[:3]] if len(others) > 2 else [others[0]]
+    return color if alpha in (None, *color) else [*color, alpha]
+
+
+def _others(names: list[str]) -> str:
+    """In words, for a finding; nothing for none. What is no text in them comes as surrogates."""
+    if not names:
+        return ""
+    more = f" and {len(names) - 8} more" if len(names) > 8 else ""
+    shown = ", ".join(n[:40].encode(errors="replace").decode() for n in names[:8])
+    return f"channels {shown}{more}: neither colour nor alpha; not read"
+
+
+def jpeg_ends(path: Path) -> bool:
+    """Whether a file is no JPEG, or one whose scans are ended.
+
+    Decoders fill in what is missing. An end within a segment is that of a thumbnail, and what
+    follows the end is another picture or a film.
+    """
+    with path.open("rb") as file:
+        if file.read(len(_JPEG)) != _JPEG:
+            return True
+        with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            at, scans = len(_JPEG) - 1, 0
+            for _ in range(_JPEG_SEGMENTS):
+                found = _JPEG_MARKER.search(data, at)
+                if found is None:
+                    return False
+                if found[0] == _JPEG_END:
+                    return scans > 0
+                scans += found[0] == _JPEG_SCAN
+                at = found.end() + int.from_bytes(data[found.end() : found.end() + 2], "big")
+    return False
+
+
+def made_up(said: str) -> bool:
+    """Whether a decoder's words mean that texels are its own invention."""
+    return any(words in said.lower() for words in _MADE_UP)
 
 
 def check_size(named: Path, width: int, height: int, size: int) -> None:

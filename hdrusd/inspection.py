@@ -5,13 +5,15 @@ Nothing is interpreted: colours have no unit, angles are degrees, lengths are so
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
 
+from hdrusd.columns import columns, cut, padded
 from hdrusd.errors import SourceRef, one_line
+from hdrusd.legacy.pictures import picture_names
 from hdrusd.legacy.scene import MAPS, Image, LegacyScene, Material, Mesh, Node
 from hdrusd.report import Report
 
@@ -35,6 +37,8 @@ def inspect(scene: LegacyScene, report: Report) -> _Row:
         for kind in ("lights", "cameras", "meshes"):
             for index in row[kind]:
                 homes.setdefault((kind, index), []).append(row["name"])
+    maps = (material.maps().values() for material in scene.materials)
+    names = picture_names(texture.image for textures in maps for texture in textures)
     meshes = [_mesh(mesh) for mesh in scene.meshes]
     lights = [_plain(light) for light in scene.lights]
     cameras = [_plain(camera) for camera in scene.cameras]
@@ -51,8 +55,8 @@ def inspect(scene: LegacyScene, report: Report) -> _Row:
         "ambient": _plain(scene.ambient),
         "counts": scene.counts(),
         "lights": lights,
-        "materials": [_material(material) for material in scene.materials],
-        "textures": _images(scene.materials),
+        "materials": [_material(material, names) for material in scene.materials],
+        "textures": _images(scene.materials, names),
         "cameras": cameras,
         "meshes": meshes,
         "nodes": nodes,
@@ -81,10 +85,10 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, (str, int, float, bool, type(None))) else str(value)
 
 
-def _material(material: Material) -> _Row:
+def _material(material: Material, names: Mapping[Hashable, str]) -> _Row:
     row: _Row = _plain(material)
     for name, texture in material.maps().items():
-        row[name]["image"] = texture.image.name
+        row[name]["image"] = names[texture.image.key()]
     return row
 
 
@@ -110,15 +114,15 @@ def _state(image: Image) -> str:
     return "file" if image.path is not None else "inside the database"
 
 
-def _images(materials: Iterable[Material]) -> list[_Row]:
+def _images(materials: Iterable[Material], names: Mapping[Hashable, str]) -> list[_Row]:
     """Each image once, with its uses."""
-    rows: dict[str, _Row] = {}
+    rows: dict[Hashable, _Row] = {}
     for material in materials:
         for name, texture in material.maps().items():
-            image = texture.image
-            row: _Row = {"name": image.name, "state": _state(image), "file": None, "uses": []}
-            row = rows.setdefault(image.name, row)
-            row["file"] = None if image.path is None else str(image.path)
+            image, key = texture.image, texture.image.key()
+            file = None if image.path is None else str(image.path)
+            row: _Row = {"name": names[key], "state": _state(image), "file": file, "uses": []}
+            row = rows.setdefault(key, row)
             row["uses"].append(f"{material.name}:{name.removesuffix('_map')}")
     return list(rows.values())
 
@@ -231,24 +235,19 @@ def _color(rgb: Sequence[float]) -> str:
 
 def _table(title: str, more: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
     """A heading and aligned columns; nothing where there are no rows."""
-    cells = [[_cut(cell) for cell in row] for row in rows]
+    cells = [[cut(one_line(cell), _NAME) for cell in row] for row in rows]
     if not cells:
         return
     titles = (title, *more)
     shown = cells[:_ROWS]
-    widths = [max(map(len, column)) for column in zip(titles, *shown, strict=True)]
+    widths = [max(map(columns, column)) for column in zip(titles, *shown, strict=True)]
 
     def aligned(row: Sequence[str]) -> str:
         pairs = zip(row, widths, strict=True)
-        return "  ".join(cell.ljust(width) for cell, width in pairs).rstrip()
+        return "  ".join(padded(cell, width) for cell, width in pairs).rstrip()
 
     yield ""
     yield aligned(titles)
     yield from map(aligned, shown)
     if len(cells) > len(shown):
         yield f"... and {len(cells) - len(shown)} more {title}; --json has them all"
-
-
-def _cut(text: str) -> str:
-    text = one_line(text)
-    return text if len(text) <= _NAME else f"{text[: _NAME - 3]}..."

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from pxr import Sdf, Usd, UsdLux
+from pxr import Sdf, UsdLux
 
 from hdrusd.account.lights import light_row
 from hdrusd.errors import SourceRef
@@ -19,7 +19,7 @@ from hdrusd.photometry.spread import SHAPES
 from hdrusd.report import Kind, Report
 from hdrusd.skies import Sky, SkyFiles, even_sky
 from hdrusd.usd.fixtures import Lamp
-from hdrusd.usd.placed import level_share
+from hdrusd.usd.placed import is_shown, level_share
 from hdrusd.usd.preset_sky import write_sky_dome, write_sky_sun
 from hdrusd.usd.transform import across
 from hdrusd.usd.tree import Place
@@ -39,8 +39,8 @@ class _Lamp:
     shaded: bool = False  # by its own fixture too
     added: bool = False  # the source says nothing of it
 
-    def row(self, path: str, stands: Sequence[Usd.Prim]) -> dict[str, Any]:
-        """The account of it for the report. ``stands``: where it does, instances too."""
+    def row(self, path: str, places: int) -> dict[str, Any]:
+        """The account of it for the report. ``places``: at which it stands, instances too."""
         return light_row(
             self.source.name,
             path,
@@ -48,9 +48,8 @@ class _Lamp:
             None if self.added else self.source,
             place=str(self.place.node.source),
             node=self.place.node.name,
-            places=len(stands),
+            places=places,
             file_flux=self.flux,
-            level=level_share(stands) if self.light.kind == "distant" else 1.0,
         )
 
 
@@ -78,12 +77,14 @@ class LampMaker:
         self.report = report
         self.rows: list[dict[str, Any]] = []
         self.fixed: list[tuple[_Lamp, Lamp]] = []
+        self._standing: list[tuple[dict[str, Any], list[Sdf.Path]]] = []  # where the rows' lamps do
 
     def write(self) -> None:
         """Every light of the scene, at its places, and the sky."""
         ambients: list[PhotometricLight] = []
         lamps: list[_Lamp] = []
-        for place in self.writer.places:
+        lit = [place for place in self.writer.places if place.node.lights]
+        for place, metres in zip(lit, self.writer.metres_at(lit), strict=True):
             for index in place.node.lights:
                 light = self.scene.lights[index]
                 local = light.kind != "ambient"
@@ -99,7 +100,7 @@ class LampMaker:
                     )
                     continue
                 file = self._luminaire(light, rule)
-                meaning = self.interpreter.light(light, rule, file)
+                meaning = self.interpreter.light(light, rule, file, metres=metres)
                 if meaning is not None and meaning.kind == "ambient":
                     ambients.append(meaning)
                 elif meaning is not None:
@@ -114,8 +115,9 @@ class LampMaker:
         at = [LightAt(it.place, it.source, it.light, it.right, it.path) for it in lamps]
         places = self.writer.tree.copies.places
         for lamp, prim in zip(lamps, self.writer.write_lights(at), strict=True):
-            stands = map(prim.GetStage().GetPrimAtPath, places(prim.GetPath()))
-            self.rows.append(lamp.row(str(prim.GetPath()), list(stands)))
+            stands = places(prim.GetPath())
+            self.rows.append(lamp.row(str(prim.GetPath()), len(stands)))
+            self._standing.append((self.rows[-1], stands))
             one = lamp.source.positions is None
             if lamp.light.kind in ("point", "spot") and one and not lamp.shaded:
                 self.fixed.append((lamp, Lamp(prim, lamp.light)))
@@ -123,11 +125,21 @@ class LampMaker:
         if sky is not None:
             self._write_sky(sky)
 
+    def count_shown(self) -> None:
+        """What the selected states show of each row, when nodes have been shown and hidden."""
+        find = self.writer.stage.GetPrimAtPath
+        for row, paths in self._standing:
+            stands = [find(path) for path in paths]
+            shown = [prim for prim in stands if is_shown(prim)]
+            row["lamps_shown"] = row["lamps"] * len(shown) // len(stands)
+            if row["kind"] == "distant":
+                row["level_lux"] = row["value"] * level_share(shown or stands)
+
     def _luminaire(self, light: legacy.Light, rule: Rule | None) -> LuminaireFile | None:
         """The photometric file that a rule gives to a light with a place."""
         if rule is None or "ies" not in rule.values or light.kind not in ("point", "spot"):
             return None
-        return self.luminaires.use(str(rule.values["ies"]), rule.place)
+        return self.luminaires.use(rule)
 
     def _aimed(self, lamp: _Lamp, rule: Rule, file: LuminaireFile) -> _Lamp:
         """The lamp with its luminaire's axis and C = 0 where the rule has them."""

@@ -9,9 +9,11 @@ from pathlib import Path, PurePosixPath
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.importers.importer import Resolver
 from hdrusd.photometry.eulumdat import read_eulumdat
-from hdrusd.photometry.ies import is_ies, read_ies, with_tilt
+from hdrusd.photometry.ies import is_ies, parse_ies, with_tilt
 from hdrusd.photometry.interpret import LuminaireFile
 from hdrusd.photometry.luminaire import MOST_BYTES
+from hdrusd.photometry.recipe_keys import note_file_rivals
+from hdrusd.photometry.sidecar import Rule
 from hdrusd.report import Kind, Report
 
 
@@ -28,13 +30,19 @@ class LuminaireFiles:
         self.report = report
         self.written: dict[str, dict[str, object]] = {}  # file -> what it is, for the report
         self._known: dict[str, LuminaireFile | None] = {}
+        self._told: set[SourceRef] = set()  # the rules whose rivals are findings
 
-    def use(self, reference: str, place: SourceRef) -> LuminaireFile | None:
-        """The luminaire that a rule at ``place`` names; None, with a finding, without it."""
+    def use(self, rule: Rule) -> LuminaireFile | None:
+        """The luminaire that a rule's ``ies`` names; None, with a finding, without it."""
+        reference, place = str(rule.values["ies"]), rule.place
         if reference not in self._known:
             path = self.resolver.find(reference, place, thing="ies")
             self._known[reference] = None if path is None else self._read(path, place)
-        return self._known[reference]
+        file = self._known[reference]
+        if place not in self._told:
+            self._told.add(place)
+            note_file_rivals(rule.values, file is not None, place, self.report)
+        return file
 
     def _read(self, path: Path, place: SourceRef) -> LuminaireFile | None:
         def tilt(name: str) -> bytes | None:
@@ -49,8 +57,9 @@ class LuminaireFiles:
             data = self._bytes(path)
             lamp = is_ies(data) or path.suffix.lower() == ".ies"
             if lamp:
-                data = with_tilt(data, tilt)
-                luminaire = read_ies(data, source, self.report)
+                file = parse_ies(data, source, self.report, tilt)
+                luminaire = file.luminaire(source, self.report)
+                data = with_tilt(data, file)
             else:
                 luminaire = read_eulumdat(data, source, self.report)
         except InputError as problem:

@@ -9,8 +9,6 @@ however many materials share it.
 
 from __future__ import annotations
 
-import hashlib
-import re
 import shutil
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator
@@ -23,6 +21,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hdrusd.colour import srgb_encode
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.images import MAX_PIXELS, read_small_image, write_exr, write_png
 from hdrusd.legacy.scene import RGB, Image, Texture
@@ -30,6 +29,7 @@ from hdrusd.map_threads import MapThreads
 from hdrusd.photometry.baked import OVERVIEW
 from hdrusd.photometry.reflectance import coded_reflectance, reflectance_table
 from hdrusd.report import Kind, Report
+from hdrusd.texture_names import file_name, format_of, named, origin
 from hdrusd.units import LUMINANCE_WEIGHTS
 from hdrusd.usd.material import Map
 
@@ -41,9 +41,6 @@ _HALF_MAX = 65504.0
 
 #: Bytes of decoded pictures that are kept for the next material.
 _KEPT = 512 << 20
-
-#: First bytes of a file by which its format is told.
-_MAGIC = 8
 
 #: Pixels of a picture that is decoded ahead; larger ones wait for their turn, one by one.
 _SMALL = 1 << 24
@@ -63,20 +60,28 @@ class _Picture:
 
     pixels: npt.NDArray[np.generic]
     integers: bool
+    dropped: str = ""  # what else the file has, in words
 
 
 class MapWriter:
-    """Writes into ``folder``; ``prefix`` is what the layers call that folder."""
+    """Writes into ``folder``; ``prefix`` is what the layers call that folder.
 
-    def __init__(self, folder: Path, prefix: str, report: Report) -> None:
+    ``home``: the source's folder, links followed. Files are named by where a picture lies from
+    there, or by its bytes where it is no file: a project has the same names wherever it lies.
+    """
+
+    def __init__(self, folder: Path, prefix: str, home: Path, report: Report) -> None:
         self.folder = folder
         self.prefix = prefix
+        self.home = home
         self.report = report
         self.written: dict[str, dict[str, object]] = {}  # file -> what it is, for the report
+        self.made_of: dict[str, Image] = {}  # file -> the picture
         self._pictures: OrderedDict[str, _Picture | None] = OrderedDict()
         self._kept = 0  # bytes of them
-        self._keys: dict[int, tuple[Image, str]] = {}  # of pictures in memory, by id()
-        self._looks: dict[str, str] = {}
+        self._keys: dict[int, tuple[Image, str]] = {}  # of pictures, by id()
+        self._broken: set[str] = set()  # keys of pictures that cannot be decoded
+        self._looks: dict[str, tuple[str, bool]] = {}  # the file, and whether it holds light
         self._data: dict[str, str] = {}
         self._threads: MapThreads[_Picture | InputError | None] | None = None
 
@@ -87,8 +92,8 @@ class MapWriter:
         Findings stay in the order in which maps are asked for. What writing raises comes out
         of a later call, or of the end of the block, when every file is there.
         """
-        named = ((key, image) for image in images if (key := self._key(image)) is not None)
-        wanted = ((key, partial(_decoded, image, _SMALL)) for key, image in named)
+        keyed = ((key, image) for image in images if (key := self._key(image)) is not None)
+        wanted = ((key, partial(_decoded, image, _SMALL)) for key, image in keyed)
         try:
             with MapThreads(wanted) as self._threads:
                 yield
@@ -101,11 +106,12 @@ class MapWriter:
         if key is None:
             return None
         if key not in self._looks:
-            name = self._copy(texture.image, key)
-            if name is None:
+            copy = self._copy(texture.image, key)
+            if copy is None:
                 return None
-            self._looks[key] = name
-        return Map(f"{self.prefix}/{self._looks[key]}", texture, raw=False)
+            self._looks[key] = copy
+        name, light = self._looks[key]
+        return Map(f"{self.prefix}/{name}", texture, raw=light)
 
     def data(self, texture: Texture) -> Map | None:
         """A copy of an image whose texels are no colours, with all their bits, to be read raw.
@@ -138,7 +144,7 @@ class MapWriter:
         picture = None if key is None else self._read(texture.image, key)
         if key is None or picture is None:
             return None
-        name = _name(texture.image, "R", f"{key}|{gamma!r}|{diffuse!r}")
+        name = file_name(texture.image, "R", f"{key}|{gamma!r}|{diffuse!r}")
         if name not in self.written:
             clipped = 0
             if picture.pixels.dtype == np.uint8 and min(diffuse) >= 0.0 and max(diffuse) <= 1.0:
@@ -160,6 +166,7 @@ class MapWriter:
                         f"({float(color.min()):.4g} to {float(color.max()):.4g}); clipped",
                     )
                 self._write(name, np.clip(color, 0.0, 1.0) if clipped else color, picture)
+            self.made_of[name] = texture.image
             self.written[name] = {
                 "kind": "reflectance",
                 "image": texture.image.name,
@@ -182,7 +189,7 @@ class MapWriter:
         gamma = 1.0 if texture.linear else gamma
         weights = _weights(emission)
         hue = tuple(np.round(weights, 9).tolist()) if peak else ()
-        name = _name(texture.image, "L", f"{key}|{gamma!r}|{peak}|{hue}")
+        name = file_name(texture.image, "L", f"{key}|{gamma!r}|{peak}|{hue}")
         if name not in self.written:
             color = linear(picture, gamma)
             top = float((color @ weights).max(initial=0.0))
@@ -198,6 +205,7 @@ class MapWriter:
                     f"{int(wrong.sum())} texels outside 0 to {_HALF_MAX:g}; clipped",
                 )
             self._write(name, np.clip(color, 0.0, _HALF_MAX), picture)
+            self.made_of[name] = texture.image
             self.written[name] = {
                 "kind": "hdr" if peak else "emission",
                 "image": texture.image.name,
@@ -255,6 +263,11 @@ class MapWriter:
         alpha = np.nan_to_num(pixels[..., -1].astype(np.float64))
         return color, np.clip(alpha / 255.0 if pixels.dtype == np.uint8 else alpha, 0.0, 1.0)
 
+    def broken(self, image: Image) -> bool:
+        """Whether a picture that something was to be made from could not be decoded."""
+        key = self._key(image)
+        return key is not None and key in self._broken
+
     def _write(self, name: str, color: npt.NDArray[Any], picture: _Picture) -> None:
         """Colour (h, w, 3) with the picture's own alpha, as half floats."""
         pixels, channels = picture.pixels, picture.pixels.shape[2]
@@ -274,36 +287,51 @@ class MapWriter:
     def _deep(self, image: Image, key: str) -> Map | None:
         """Of a format that not every renderer reads, and more than the 8 bits of a look's copy."""
         picture = self._read(image, key)
-        if picture is None or picture.pixels.dtype == np.uint8 or _format(image) in _PORTABLE:
+        if picture is None or picture.pixels.dtype == np.uint8 or format_of(image) in _PORTABLE:
             return None
-        name = _name(image, "D", key)
+        name = file_name(image, "D", key)
         self._do(4 * picture.pixels.size, partial(_write_deep, self.folder / name, picture.pixels))
+        self.made_of[name] = image
         self.written.setdefault(name, {"kind": "data", "image": image.name})
         return Map(f"{self.prefix}/{name}", Texture(image), raw=True)
 
-    def _copy(self, image: Image, key: str) -> str | None:
+    def _copy(self, image: Image, key: str) -> tuple[str, bool] | None:
+        """The file, and whether its texels are linear and no codes for a screen."""
         picture = self._read(image, key)
         if picture is None:
             return None
-        suffix = _format(image)
+        suffix = format_of(image)
         if suffix in _PORTABLE:
-            name = _name(image, "", key, suffix)
+            name = file_name(image, "", key, suffix)
             self._do(0, partial(_write_copy, self.folder / name, image))
         else:
-            name = _name(image, "", key, ".png")
-            codes = _eight_bit(picture.pixels)
+            name = file_name(image, "", key, ".png")
+            codes = self._codes(image, picture)
             self._do(codes.nbytes, partial(write_png, self.folder / name, codes))
+        self.made_of[name] = image
         self.written.setdefault(name, {"kind": "look", "image": image.name})
-        return name
+        return name, suffix in _PORTABLE and not picture.integers
+
+    def _codes(self, image: Image, picture: _Picture) -> npt.NDArray[np.uint8]:
+        """8 bits for a screen: integers in proportion, light by sRGB's curve, alpha as it is."""
+        if picture.pixels.dtype == np.uint8:
+            return np.asarray(picture.pixels, np.uint8)
+        values = np.nan_to_num(picture.pixels.astype(np.float64), posinf=_HALF_MAX, neginf=0.0)
+        if not picture.integers:
+            color = values[..., : 3 if values.shape[2] > 2 else 1]
+            outside = int(((color < 0.0) | (color > 1.0)).any(axis=-1).sum())
+            if outside:
+                most = f"{outside} of {color[..., 0].size} texels, up to {color.max():.4g}"
+                text = f"{most}, are outside 0 to 1; clipped in the look's copy"
+                self.report.add(Kind.CLAMPED, "look-clipped", image.source, image.name, text)
+            color[:] = srgb_encode(np.clip(color, 0.0, 1.0))
+        return (np.clip(values, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
 
     def _key(self, image: Image) -> str | None:
         if image.missing:
             return None
-        if image.path is not None:
-            return str(image.path)
         if id(image) not in self._keys:
-            data = image.data if image.data is not None else _bytes(image.pixels)
-            self._keys[id(image)] = image, hashlib.sha256(data).hexdigest()
+            self._keys[id(image)] = image, origin(image, self.home)
         return self._keys[id(image)][1]
 
     def _read(self, image: Image, key: str) -> _Picture | None:
@@ -320,7 +348,11 @@ class MapWriter:
             found = _decoded(image, MAX_PIXELS)
         if isinstance(found, InputError):
             self.report.add(Kind.INVALID, "image-broken", image.source, image.name, found.problem)
+            self._broken.add(key)
             return None
+        if found is not None and found.dropped:
+            text = found.dropped
+            self.report.add(Kind.DROPPED, "image-channels", image.source, image.name, text)
         return found
 
 
@@ -332,12 +364,11 @@ def _decoded(image: Image, most: int) -> _Picture | InputError | None:
     """The picture, or why there is none; None for one of more than ``most`` pixels."""
     if image.pixels is not None:
         return _Picture(image.pixels.reshape(*image.pixels.shape[:2], -1), integers=True)
-    path = image.path or Path(_stem(image) + (_suffix(image.data) or ".img"))
     try:
-        found = read_small_image(path, image.data, most)
+        found = read_small_image(named(image), image.data, most)
     except InputError as problem:
         return problem
-    return None if found is None else _Picture(found.pixels, found.integers)
+    return None if found is None else _Picture(found.pixels, found.integers, found.dropped)
 
 
 def _write_map(path: Path, color: npt.NDArray[Any]) -> None:
@@ -388,42 +419,3 @@ def linear(picture: _Picture, gamma: float) -> Floats:
         values = np.nan_to_num(color.astype(np.float64), posinf=_HALF_MAX, neginf=0.0)
         values = values**gamma if picture.integers else values
     return np.asarray(np.broadcast_to(values, (*pixels.shape[:2], 3)))
-
-
-def _eight_bit(pixels: npt.NDArray[np.generic]) -> npt.NDArray[np.uint8]:
-    if pixels.dtype == np.uint8:
-        return np.asarray(pixels, np.uint8)
-    scaled = np.clip(pixels.astype(np.float64), 0.0, 1.0) * 255.0 + 0.5
-    return scaled.astype(np.uint8)
-
-
-def _bytes(pixels: npt.NDArray[np.uint8] | None) -> bytes:
-    return b"" if pixels is None else f"{pixels.shape}".encode() + pixels.tobytes()
-
-
-def _format(image: Image) -> str:
-    """As ``_suffix``, of an image that is not missing."""
-    if image.data is None and image.path is not None:
-        with image.path.open("rb") as file:
-            return _suffix(file.read(_MAGIC))
-    return _suffix(image.data)
-
-
-def _suffix(data: bytes | None) -> str:
-    """The format by its first bytes; a file's own suffix is not believed."""
-    magic = (data or b"")[:_MAGIC]
-    known = {b"\x89PNG": ".png", b"\xff\xd8\xff": ".jpg", b"v/1\x01": ".exr", b"DDS ": ".dds"}
-    for start, suffix in known.items():
-        if magic.startswith(start):
-            return suffix
-    return ""
-
-
-def _stem(image: Image) -> str:
-    name = image.path.stem if image.path is not None else Path(image.name.replace("\\", "/")).stem
-    return re.sub(r"[^A-Za-z0-9_-]+", "_", name)[:48].strip("_") or "image"
-
-
-def _name(image: Image, role: str, key: str, suffix: str = ".exr") -> str:
-    digest = hashlib.sha256(key.encode()).hexdigest()[:8]
-    return "_".join(part for part in (_stem(image), role, digest) if part) + suffix

@@ -125,6 +125,14 @@ class TextureUse:
     channel: int = -1  # 0 to 3: this channel alone; -1: rgb
     fallback: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
 
+    def leaves_shares(self) -> bool:
+        """Whether scale and bias lead colours of 0 to 1 to what is no share any more."""
+        ends = [
+            *self.bias[:3],
+            *(s + b for s, b in zip(self.scale[:3], self.bias[:3], strict=True)),
+        ]
+        return min(ends) < 0.0 or max(ends) > 1.0 + 1e-6
+
 
 @dataclass(frozen=True, slots=True)
 class Material:
@@ -163,6 +171,16 @@ class Material:
     occlusion: float = 1.0  # share of the ambient light that arrives
     occlusion_map: TextureUse | None = None
     normal_map: TextureUse | None = None  # tangent space, after scale and bias
+
+    @property
+    def least_texel(self) -> float:
+        """The least opacity that is there, of a map: textures hold 11 bits.
+
+        What stands at the threshold is there (UsdPreviewSurface, glTF), also where a half float
+        rounds it down, by less than 2^-11. A threshold above 1 lets nothing through.
+        """
+        threshold = self.opacity_threshold
+        return threshold * (1.0 - 2.0**-11) if threshold <= 1.0 else threshold
 
     def maps(self) -> dict[str, TextureUse]:
         """The maps in use by the names of their fields, in the order of the fields."""
@@ -286,3 +304,4 @@ class ImageData:
     #: Of a UDIM texture: images by column and row of the unit square that they cover, (0, 0)
     #: being tile 1001. Then ``pixels`` is empty.
     tiles: Mapping[tuple[int, int], ImageData] | None = None
+    dropped: str = ""  # what else the file has, in words

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hdrusd.legacy.scene import DATA_MAPS, RGB, LegacyScene, Material, Texture
+from hdrusd.legacy.scene import COVERING, DATA_MAPS, RGB, LegacyScene, Material, Texture
 from hdrusd.legacy.texels import texels
 from hdrusd.maps import MapWriter
 from hdrusd.photometry.confidence import confidence
@@ -20,7 +20,7 @@ from hdrusd.photometry.sidecar import Rule, Sidecar
 from hdrusd.report import Kind, Report
 from hdrusd.units import TEXTURE_GAMMA
 from hdrusd.usd.material import Map, Surface
-from hdrusd.usd.mesh import COLOR_PRIMVAR
+from hdrusd.usd.mesh import COLOR_PRIMVAR, OPACITY_PRIMVAR
 from hdrusd.usd.preview import roughness_from_shininess
 
 Array = npt.NDArray[Any]
@@ -30,9 +30,6 @@ _REFLECTION = frozenset({"diffuse", "gamma", "specular", "roughness", "shininess
 
 #: The brightest surface that is written, cd/m2; 32-bit floats end at 3e38.
 _BRIGHTEST = 1e30
-
-#: TexEnv modes in which the texture covers the material's colour.
-_COVERING = ("REPLACE", "DECAL")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +46,7 @@ class SurfaceMaker:
         """The textures of the look as it was, by "diffuse", "normal": as the fields."""
         peak = max(*material.emission, 1.0) if material.emission_cd_m2 else 1.0
         emission: RGB = tuple(c / peak for c in material.emission)  # type: ignore[assignment]
-        covered = material.diffuse_map is not None and material.diffuse_map.mode in _COVERING
+        covered = material.diffuse_map is not None and material.diffuse_map.mode in COVERING
         diffuse = (1.0, 1.0, 1.0) if covered else material.diffuse
         uses = {
             "diffuse": (material.diffuse_map, diffuse),
@@ -101,21 +98,23 @@ class SurfaceMaker:
         material: Material,
         *,
         colored: bool,
+        faded: bool = False,
         area: Callable[[], LampArea | None] = lambda: None,
         places: Callable[[Texture], Array | None] = lambda texture: None,
     ) -> Surface:
         """A material of ``glossed`` in photometric terms.
 
-        ``colored``: worn by meshes with vertex colours. ``area``: of a lamp that wears it, asked
-        where the photometry file does not say. ``places``: texture coordinates (n, 2) spread
-        evenly over all that wears it, None where that is not known.
+        ``colored``, ``faded``: worn by meshes with vertex colours, with vertex alpha that counts.
+        ``area``: of a lamp that wears it, asked where the photometry file does not say.
+        ``places``: texture coordinates (n, 2) spread evenly over all that wears it, None where
+        that is not known.
         """
         rule = self.sidecar.match("material", material.name)
         gamma = self._gamma(rule)
         stated_d = rule.three("diffuse") if rule is not None else None
         diffuse = stated_d or material.diffuse
         textured = material.diffuse_map
-        if stated_d is None and textured is not None and textured.mode in _COVERING:
+        if stated_d is None and textured is not None and textured.mode in COVERING:
             diffuse = (1.0, 1.0, 1.0)
         hdr = bool(rule and rule.values.get("hdr_texture"))
         mean, how = self._mean_luminance(material, rule, area)
@@ -143,6 +142,8 @@ class SurfaceMaker:
         specular = self._clipped(material, "specular", material.specular)
         if not dark:
             self._note_differences(material, diffuse, specular, colored=colored)
+        if faded:
+            self._note_fading(material)
         bright = any(emission)
         if rule is not None and not bright and _REFLECTION & rule.values.keys():
             provenance, name, source = rule.provenance, str(rule.place), rule.source
@@ -157,12 +158,14 @@ class SurfaceMaker:
             source_texture=self._look_file(textured),
             emission=emission,
             luminance=luminance(emission),
+            peak=hdr,
             emission_map=emission_map,
             replaces_reflection=dark,
             opacity_map=self._opacity(material),
             specular_map=specular_map,
             data_maps={} if dark else self._data(material),
             vertex_color=COLOR_PRIMVAR if colored else "",
+            vertex_opacity=OPACITY_PRIMVAR if faded else "",
             provenance=provenance,
             rule=name,
             source=source,
@@ -262,10 +265,11 @@ class SurfaceMaker:
         return made.file if made else ""
 
     def _opacity(self, material: Material) -> Map | None:
-        """Opacity stays as it was: the look's own file, read raw."""
-        if material.opacity_map is None or material.alpha_mode == "opaque":
+        """Opacity stays as it was, read raw: alpha is that of the look's own file."""
+        texture = material.opacity_map
+        if texture is None or material.alpha_mode == "opaque":
             return None
-        made = self.maps.look(material.opacity_map)
+        made = self.maps.look(texture) if texture.channel == "a" else self.maps.data(texture)
         return replace(made, raw=True) if made else None
 
     def _data(self, material: Material) -> dict[str, Map]:
@@ -305,6 +309,15 @@ class SurfaceMaker:
             text = f"vertex colours times {what}: only hdrusd multiplies both"
             self._note(material, Kind.REPLACED, "vertex-color", text)
 
+    def _note_fading(self, material: Material) -> None:
+        """Vertex alpha times another opacity, which no UsdPreviewSurface multiplies."""
+        if material.opacity_map is not None:
+            text = "vertex alpha dropped; the opacity of its picture counts"
+            self._note(material, Kind.DROPPED, "vertex-alpha", text)
+        elif material.alpha < 1.0:
+            text = f"vertex alpha counts, without the material's {material.alpha:.3g}"
+            self._note(material, Kind.REPLACED, "vertex-alpha", text)
+
     def _note(self, material: Material, kind: Kind, code: str, text: str) -> None:
         self.report.add(kind, code, material.source, material.name, text)
 
@@ -319,13 +332,31 @@ def _mean(values: Array, texture: Texture, uv: Array | None) -> float:
 
 def colored_materials(scene: LegacyScene) -> set[int]:
     """Materials worn by a mesh with vertex colours that are not all white."""
-    colored: set[int] = set()
+    return _worn(scene, lambda colors: not bool((colors[:, :3] == 1.0).all()))
+
+
+def faded_materials(scene: LegacyScene) -> set[int]:
+    """Materials that let something through, worn by a mesh with vertex alpha below 1."""
+    worn = _worn(scene, lambda colors: float(colors[:, 3].min(initial=1.0)) < 1.0)
+    return {number for number in worn if scene.materials[number].alpha_mode != "opaque"}
+
+
+def _worn(scene: LegacyScene, test: Callable[[Array], bool]) -> set[int]:
+    """Materials of the meshes whose vertex colours (n, 4) pass a test."""
+    found: set[int] = set()
     for mesh in scene.meshes:
-        if mesh.colors is not None and not bool((mesh.colors[:, :3] == 1.0).all()):
-            colored.update(subset.material for subset in mesh.subsets)
+        if mesh.colors is not None and test(mesh.colors):
+            found.update(subset.material for subset in mesh.subsets)
             if mesh.material is not None:
-                colored.add(mesh.material)
-    return colored
+                found.add(mesh.material)
+    return found
+
+
+def _luminance_of(surface: Surface) -> str:
+    """Where a surface has its ``luminance``."""
+    if surface.emission_map is None:
+        return "surface"
+    return "brightest texel" if surface.peak else "full code"
 
 
 def material_rows(
@@ -341,6 +372,7 @@ def material_rows(
             "specular": list(surface.specular),
             "reflectance_map": surface.diffuse_map.file if surface.diffuse_map else None,
             "luminance_cd_m2": surface.luminance,
+            "luminance_of": _luminance_of(surface),
             "replaces_reflection": surface.replaces_reflection,
             "faces": 0,  # these five: account/reflectances.py, where the faces are known
             "area_m2": 0.0,

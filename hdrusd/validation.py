@@ -1,4 +1,4 @@
-"""USD validators for photometry, and ``validate``, which runs them with USD's own.
+"""USD validators for photometry.
 
 USD knows the validators from ``schemas/validation/plugInfo.json`` and imports this
 module when one of them is first asked for; in usdview and ``usdchecker`` too, with
@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import wraps
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdShade, UsdValidation
@@ -26,59 +26,6 @@ register()
 
 #: How far two statements of one quantity may differ, relative to the larger.
 AGREEMENT = 1e-3
-
-#: USD's own validators that ``validate`` runs: whether the stage composes, says what
-#: it is and refers to what exists, and whether lights and materials stand where they may.
-#: Units and up axis are with StageUnits; checks of every mesh are left out for their cost.
-BUILT_IN = (
-    "usdValidation:CompositionErrorTest",
-    "usdValidation:StageMetadataChecker",
-    "usdLuxValidators:EncapsulationRulesValidator",
-    "usdShadeValidators:EncapsulationMaterialValidator",
-    "usdShadeValidators:MaterialBindingApiAppliedValidator",
-    "usdShadeValidators:MaterialBindingRelationships",
-    "usdUtilsValidators:MissingReferenceValidator",
-)
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """One thing that a validator found."""
-
-    severity: Literal["error", "warning"]
-    validator: str  # "LightIntensity"; USD's own with their plug-in: "usdLuxValidators:..."
-    path: str  # of the prim or property, "/" for the stage
-    text: str
-
-    def __str__(self) -> str:
-        return f"{self.path}: {self.text}"
-
-
-def validate(stage: Usd.Stage) -> list[Problem]:
-    """What the validators of keyword "hdrusd" and ``BUILT_IN`` say of a stage, errors first."""
-    registry = UsdValidation.ValidationRegistry()
-    # By keyword, so that validators that other packages file under ours run as well.
-    ours = [found.name for found in registry.GetValidatorMetadataForKeyword("hdrusd")]
-    validators = registry.GetOrLoadValidatorsByName([*ours, *BUILT_IN])
-    errors = UsdValidation.ValidationContext(validators).Validate(stage)
-    problems = {_problem(error) for error in errors}
-    return sorted(problems, key=lambda p: (p.severity, p.path, p.validator, p.text))
-
-
-def _problem(error: UsdValidation.ValidationError) -> Problem:
-    grave = error.GetType() == UsdValidation.ValidationErrorType.Error
-    name = error.GetValidator().GetMetadata().name
-    path = next((_site_path(site) for site in error.GetSites()), "/")
-    text = error.GetMessage().strip()
-    return Problem(
-        "error" if grave else "warning", name.removeprefix("hdrusd.validation:"), path, text
-    )
-
-
-def _site_path(site: UsdValidation.ValidationErrorSite) -> str:
-    if site.IsProperty():
-        return str(site.GetProperty().GetPath())
-    return str(site.GetPrim().GetPath()) if site.IsPrim() else "/"
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,6 +37,7 @@ def ies_text(
     label: str = "IESNA:LM-63-2002",
     keywords: str = "[LUMINAIRE] Spot 12",
     tilt: str = "TILT=NONE",
+    lamps: int = 1,
     lumens: float = -1.0,
     multiplier: float = 1.0,
     type: str = "C",
@@ -49,7 +50,7 @@ def ies_text(
     head = [line for line in (label, keywords, tilt) if line]
     counts = f"{len(angles)} {len(planes)} {TYPES[type]} {units}"
     body = [
-        f"1 {lumens:g} {multiplier:g} {counts} {words(size)}",
+        f"{lamps} {lumens:g} {multiplier:g} {counts} {words(size)}",
         f"{ballast:g} {photometric:g} 100",
         words(angles),
         words(planes),

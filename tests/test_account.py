@@ -19,7 +19,8 @@ from converted import POINT, SPOT, lights, material, opened, run, sidecar
 from jsonschema import Draft202012Validator
 from report_schema import SCHEMA, problems, undescribed
 
-from hdrusd.account.fix_first import MOST, Scene, fix_first
+from hdrusd.account.fix import MOST, Scene
+from hdrusd.account.fix_first import fix_first
 from hdrusd.account.images import image_rows
 from hdrusd.account.text import summary
 from hdrusd.account.wear import wearers, worn
@@ -27,6 +28,7 @@ from hdrusd.conversion import Result
 from hdrusd.legacy.scene import Subset, Texture
 from hdrusd.photometry.recipe_entry import toml_entry
 from hdrusd.usd.material import Surface
+from hdrusd.usd.placed_area import PlacedArea
 
 GREY = np.full((64, 64, 3), 100, np.uint8)
 
@@ -354,7 +356,8 @@ def test_a_material_is_looked_for_on_its_own_meshes_alone() -> None:
     )
     meshes = wearers(scene)
     assert meshes == {0: [0], 1: [1, 2], None: [1]}
-    found = worn(scene, {0: 1.0, 1: 2.0, 2: 3.0}, 1, meshes[1])
+    placed = {mesh: PlacedArea(np.eye(3)[None], np.array([mesh + 1.0])) for mesh in range(3)}
+    found = worn(scene, placed, 1, meshes[1])
     assert (found.faces, found.area) == (2, 5.0)
 
 
@@ -374,7 +377,7 @@ def test_pictures_are_shared_by_materials_of_one_name(tmp_path: Path) -> None:
     image = picture()
     materials = [paint(diffuse_map=Texture(image)), paint(diffuse_map=Texture(image))]
     surfaces = [Surface(diffuse=(1.0, 1.0, 1.0), gamma=2.2)] * 2
-    (row,) = image_rows(materials, surfaces, [1.0, 3.0], {})
+    (row,) = image_rows(materials, surfaces, [1.0, 3.0], {}, lambda image: False)
     assert (row["materials"], row["share"]) == (["paint"], 1.0)
 
 

@@ -11,7 +11,7 @@ import pytest
 from builders import gltf_lights
 from converted import POINT, SPOT, run, sidecar
 
-from hdrusd.account.lights import all_names, group_patterns
+from hdrusd.account.lights import pattern_finder
 from hdrusd.account.text import summary
 
 
@@ -66,7 +66,7 @@ def test_what_glows_takes_nothing_from_a_lamps_share(tmp_path: Path) -> None:
 def test_patterns_fit_a_group_and_no_other(names: tuple[str, ...], patterns: list[str]) -> None:
     rows = [{"name": n, "node": f"node{i}", "path": f"/a/{i}"} for i, n in enumerate(names)]
     group = rows if names[2] == "ls12" else rows[:2]
-    assert group_patterns(group, all_names(rows)) == patterns
+    assert pattern_finder(rows)(group) == patterns
     fitting = [
         row
         for row in rows
@@ -80,7 +80,7 @@ def test_a_node_of_the_name_is_no_lamp_of_the_group() -> None:
         {"name": name, "node": node, "path": f"/a/{node}/{name}"}
         for name, node in (("ls0", "ls0"), ("ls1", "ls1"), ("bulb", "ls9"))
     ]
-    assert group_patterns(rows[:2], all_names(rows)) == ["ls0", "ls1"]
+    assert pattern_finder(rows)(rows[:2]) == ["ls0", "ls1"]
 
 
 def test_lamps_of_one_name_get_their_own_numbers(tmp_path: Path) -> None:

@@ -147,13 +147,40 @@ def test_the_account_leads_back_to_the_entry(tmp_path: Path) -> None:
     assert "lamp[1]" in entry["what"]
 
 
-def test_a_lamp_of_no_strength_does_not_shine(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("keys", "others"),
+    [
+        ("candella = 250", ["sidecar-unknown-key"]),
+        ("candela = -5", ["sidecar-invalid"]),
+        ("watts = 70", ["sidecar-invalid"]),
+        ('watts = 70\nlamp = "neon"', ["sidecar-invalid"] * 2),
+        ("illuminance = 12", []),
+        ('ies = "gone.ies"', ["file-missing"]),
+        ('ies = "bad.ies"', ["profile-invalid"]),
+        ('ies = "bad.ies"\nwatts = 70', ["sidecar-invalid", "profile-invalid"]),
+    ],
+)
+def test_a_lamp_of_no_strength_does_not_shine(tmp_path: Path, keys: str, others: list[str]) -> None:
     source = floor(tmp_path)
-    sidecar(tmp_path, "[[lamp]]\nat = [[0, 5, 0]]\ncandella = 250\n")
+    (tmp_path / "bad.ies").write_text("IESNA91\nTILT=NONE\n1 2\n")
+    sidecar(tmp_path, f"[[lamp]]\nat = [[0, 5, 0]]\n{keys}\n")
     result = run(source)
     assert result.lights == []
-    (finding,) = (f for f in result.report if f.code == "sidecar-invalid")
-    assert finding.text.startswith("no strength; not placed; want one of candela, ies,")
+    assert not [prim for prim in opened(result).Traverse() if prim.GetName() == "Lamp"]
+    weak = [f for f in result.report if f.text.startswith("no strength; not placed; want one of")]
+    assert [(f.code, str(f.source.place)) for f in weak] == [("sidecar-invalid", "lamp[1]")]
+    told = [f.code for f in result.report if "lamp[1]" in str(f.source) and f not in weak]
+    assert told == others
+
+
+@pytest.mark.parametrize("keys", ['watts = 70\nlamp = "led"', "watts = 70\nefficacy = 90"])
+def test_a_bad_file_leaves_another_strength(tmp_path: Path, keys: str) -> None:
+    source = floor(tmp_path)
+    (tmp_path / "bad.ies").write_text("IESNA91\nTILT=NONE\n1 2\n")
+    sidecar(tmp_path, f'[[lamp]]\nat = [[0, 5, 0]]\nies = "bad.ies"\n{keys}\n')
+    result = run(source)
+    assert len(result.lights) == 1
+    assert "sidecar-rival" not in result.report.codes()
 
 
 @pytest.mark.parametrize(

@@ -46,6 +46,75 @@ def test_two_sources_of_one_name_keep_their_suffix(tmp_path: Path) -> None:
     }
 
 
+def test_a_suffix_that_makes_another_files_name_gets_a_number(tmp_path: Path) -> None:
+    _touch(tmp_path / "x.gltf", tmp_path / "x.dae", tmp_path / "x_gltf.gltf", tmp_path / "y.flt")
+    _touch(tmp_path / "x_gltf_2.flt")
+    assert _stages(tmp_path) == {
+        "x.dae": "x_dae.usda",
+        "x.gltf": "x_gltf_3.usda",
+        "x_gltf.gltf": "x_gltf.usda",  # their own names
+        "x_gltf_2.flt": "x_gltf_2.usda",
+        "y.flt": "y.usda",
+    }
+
+
+def test_folders_that_differ_in_case_alone_do_not_share_a_stage(tmp_path: Path) -> None:
+    _touch(tmp_path / "A/x.obj", tmp_path / "a/x.obj", tmp_path / "a/y.obj")
+    assert _stages(tmp_path) == {
+        "A/x.obj": "A/x_obj.usda",
+        "a/x.obj": "a/x_obj_2.usda",
+        "a/y.obj": "a/y.usda",
+    }
+
+
+def test_no_stage_stands_where_a_folder_will(tmp_path: Path) -> None:
+    _touch(tmp_path / "x.obj", tmp_path / "x.usda/a.obj", tmp_path / "y.obj")
+    _touch(tmp_path / "y.textures/b.obj")
+    assert _stages(tmp_path) == {
+        "x.obj": "x_2.usda",
+        "x.usda/a.obj": "x.usda/a.usda",
+        "y.obj": "y_2.usda",
+        "y.textures/b.obj": "y.textures/b.usda",
+    }
+
+
+def test_no_stage_replaces_another_source(tmp_path: Path) -> None:
+    """In the folder of the sources: a.usda wants a_usda.usda, which somebody wrote."""
+    _touch(tmp_path / "a.obj", tmp_path / "a.usda", tmp_path / "a_usda.usda")
+    tasks = plan([tmp_path], tmp_path)
+    assert {task.source.name: task.output.name for task in tasks} == {
+        "a.obj": "a_obj.usda",
+        "a.usda": "a_usda_2.usda",
+        "a_usda.usda": "a_usda.usda",  # which convert refuses, as ever
+    }
+
+
+def test_sources_above_the_working_folder_stay_below_the_output(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _touch(tmp_path / "here/two.obj", tmp_path / "proj/scene.obj")
+    monkeypatch.chdir(tmp_path / "here")
+    named = [Path("two.obj"), Path("../proj/scene.obj"), Path("../here/two.obj")]
+    tasks = plan(named, Path("out"))
+    assert {str(task.source): str(task.output) for task in tasks} == {
+        "../here/two.obj": "out/here/two.usda",  # one file with two.obj
+        "../proj/scene.obj": "out/proj/scene.usda",
+    }
+    assert plan([Path("..")], Path("out"))[0].output == Path("out/here/two.usda")
+    # Two steps up from where a link leads.
+    (tmp_path / "here/link").symlink_to(tmp_path / "proj")
+    tasks = plan([Path("two.obj"), Path("link/../proj/scene.obj")], Path("out"))
+    assert [str(task.output) for task in tasks] == ["out/proj/scene.usda", "out/here/two.usda"]
+
+
+def test_a_link_below_the_output_leads_nothing_out_of_it(tmp_path: Path) -> None:
+    _touch(tmp_path / "src/a/x.obj", tmp_path / "src/b/x.obj", tmp_path / "elsewhere/x.usda")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/b").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(InputError, match=r"elsewhere, outside .*out; want"):
+        plan([tmp_path / "src"], tmp_path / "out")
+
+
 def test_no_stage_is_called_like_a_layer_of_another(tmp_path: Path) -> None:
     _touch(tmp_path / "lamp.flt", tmp_path / "lamp.look.obj")
     assert _stages(tmp_path) == {"lamp.flt": "lamp.usda", "lamp.look.obj": "lamp_look_obj.usda"}

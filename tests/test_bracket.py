@@ -109,6 +109,32 @@ def test_candela_and_area_are_the_mean_luminance(tmp_path: Path) -> None:
     assert said["calibration"] == "320 cd from 0.04 m2 in 50,10,30,40: 8000 cd/m2"
 
 
+@pytest.mark.parametrize(
+    ("stops", "level", "lost"),
+    [
+        (STOPS, 3000.0, 0),  # all of the lamp is held; a dark column beside it may stay
+        (STOPS[3:], 3000.0, 32 * 31),  # saturated in all
+        ((-14.0, 0.0), 10.0, 1),  # noise in one, saturated in the other
+    ],
+)
+def test_a_lamp_that_no_exposure_holds_calibrates_nothing(
+    tmp_path: Path, stops: Any, level: float, lost: int
+) -> None:
+    light = np.full((64, 64, 3), 1e-3)
+    light[:8] = np.logspace(-0.9, 3.9, 64)[:, None]
+    light[16:48, 16:47] = 3000.0
+    light[20, 20] = level
+    files = write_bracket(tmp_path, light, stops)
+    lamp = Calibration(candela=10.0, area=0.01, region=(16, 16, 32, 32))
+    if lost:
+        text = f"region 16,16,32,32: {lost} of 1024 pixels are saturated"
+        with pytest.raises(HdrusdError, match=text):
+            merged(files, calibration=lamp, response="srgb")
+    else:
+        picture, _, _ = merged(files, calibration=lamp, response="srgb")
+        assert luminance(picture[16:48, 16:48]).mean() == pytest.approx(1000.0, rel=1e-4)
+
+
 def test_a_region_that_the_lamp_does_not_fill_is_told(tmp_path: Path) -> None:
     light = np.full((64, 64, 3), 0.3)
     light[16:48, 16:48] = 3000.0
@@ -288,11 +314,31 @@ def test_a_spot_that_is_clipped_is_one_line(tmp_path: Path) -> None:
         merged(files, spot=Spot(199, 4, 2.0, 1e6))
 
 
+@pytest.mark.parametrize(("kept", "left"), [(0.5, 0), (0.98, 0), (0.5, 2000)])
+def test_a_jpeg_that_is_not_whole_is_refused(tmp_path: Path, kept: float, left: int) -> None:
+    """Cut short, or with a hole; decoders fill in what is missing."""
+    files = write_bracket(tmp_path, LIGHT, suffix=".jpg")
+    data = files[3].read_bytes()
+    files[3].write_bytes(data[: int(kept * len(data))] + data[len(data) - left :] * bool(left))
+    with pytest.raises(InputError, match=r"im3\.jpg: broken image"):
+        merged(files)
+
+
+def test_exposures_without_a_speed_name_what_is_missing(tmp_path: Path) -> None:
+    for stop in STOPS:
+        tags = exif(stop) | {"Exif:PhotographicSensitivity": 0}
+        write_photograph(tmp_path / f"{stop}.png", shoot(LIGHT, stop), tags)
+    files = list(tmp_path.iterdir())
+    with pytest.raises(HdrusdError, match="no PhotographicSensitivity in any picture: nothing"):
+        merged(files)
+
+
 def test_without_exif_nothing_is_made_up(tmp_path: Path) -> None:
     files = [write_photograph(tmp_path / f"{i}.png", shoot(LIGHT, s)) for i, s in enumerate(STOPS)]
     with pytest.raises(InputError, match=r"no ExposureTime .* \(nor in 6 others\); want --ev"):
         merged(files)
-    with pytest.raises(HdrusdError, match="want --spot, or --candela and --area"):
+    relative = "exposures are relative, as given: nothing .* want --spot, or --candela and --area"
+    with pytest.raises(HdrusdError, match=relative):
         merged(files, exposures=tuple(2.0**STOPS))
 
 

@@ -24,9 +24,9 @@ from converted import (
 from pxr import Gf, Usd, UsdGeom, UsdShade
 
 from hdrusd import convert as convert_module
+from hdrusd.checking import validate
 from hdrusd.conversion import Result
 from hdrusd.errors import InputError, UnknownNameError, ValidationError
-from hdrusd.validation import validate
 
 # -- layers -------------------------------------------------------------------------------
 

@@ -11,11 +11,11 @@ import pytest
 from converted import lights, luminance, opened, run, sidecar
 from pxr import Usd, UsdGeom
 
+from hdrusd.checking import validate
 from hdrusd.job import Job
 from hdrusd.render import render_sequence
 from hdrusd.report import Report
 from hdrusd.units import LUMINANCE_WEIGHTS
-from hdrusd.validation import validate
 
 SIZE = (64, 36)  # as a camera of the recipe has it
 FOV = 50.0

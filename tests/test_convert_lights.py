@@ -23,10 +23,10 @@ from converted import (
 )
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
+from hdrusd.checking import validate
 from hdrusd.errors import InputError
 from hdrusd.usd.light import read_light_row
 from hdrusd.usd.lux import read_lux
-from hdrusd.validation import validate
 
 # -- exact light units --------------------------------------------------------------------
 

@@ -115,7 +115,7 @@ def test_the_file_is_copied_once_and_named_by_the_light(tmp_path: Path) -> None:
 
 def test_the_copy_holds_what_its_tilt_file_says(tmp_path: Path) -> None:
     (tmp_path / "a.ies").write_text(ies_text(tilt="TILT=lamp.tlt"))
-    (tmp_path / "lamp.tlt").write_text("1\n2\n0 90\n0.5 1\n")
+    (tmp_path / "lamp.tlt").write_text("1\n2\n0 90\n0.5 1\n\x1a")
     sidecar(tmp_path, rule('ies = "a.ies"\naxis = [0, -1, 0]\nc0 = [1, 0, 0]'))
     made, _ = scene(run(gltf_lights(tmp_path / "a.gltf", [POINT]), tmp_path / "out" / "a.usda"))
     assert toward(made, (0, -1, 0)) == pytest.approx([200.0], rel=1e-5)
@@ -168,6 +168,32 @@ def test_without_its_file_a_light_is_what_the_rest_says(
         assert list(folder.glob("a.textures/*")) == []
     else:
         assert row["unit"] == "times the file"
+
+
+@pytest.mark.parametrize(
+    ("file", "keys", "rivals"),
+    [
+        ("a.ies", "candela = 1", ["candela"]),
+        ("a.ies", "lumens = 1", []),  # the luminaire's flux
+        ("a.ies", "scale = 1\nlumens = 2", ["scale"]),
+        ("a.ies", "watts = 1\nefficacy = 9", ["watts"]),
+        ("a.ies", 'lumens = 1\nspread = "sphere"', ["spread"]),
+        ("bad.ies", "candela = 1", []),
+        ("gone.ies", "candela = 1", []),
+        ("gone.ies", "candela = 1\nlumens = 9", ["lumens"]),
+    ],
+)
+def test_what_counts_beside_a_file_is_said_when_it_is_read(
+    tmp_path: Path, file: str, keys: str, rivals: list[str]
+) -> None:
+    (tmp_path / "a.ies").write_text(SIDES)
+    (tmp_path / "bad.ies").write_text("IESNA91\n")
+    sidecar(tmp_path, rule(f'ies = "{file}"\n{keys}'))
+    nodes = [{"extensions": {"KHR_lights_punctual": {"light": 0}}}] * 2
+    result = run(gltf_lights(tmp_path / "a.gltf", [POINT], nodes))
+    assert [f.thing for f in result.report if f.code == "sidecar-rival"] == rivals
+    units = [row["unit"] for row in result.lights]
+    assert units == ["times the file" if file == "a.ies" else "cd"] * 2
 
 
 def test_a_declared_root_allows_a_file_elsewhere(tmp_path: Path) -> None:

@@ -327,10 +327,13 @@ BLENDER = '#usda 1.0\n(\n    doc = "Blender v5.0.1"\n    defaultPrim = "World"\n
 BLENDER += '    metersPerUnit = 1\n    upAxis = "Z"\n)\n'
 
 
-def test_blender_s_watts_are_told_and_read_when_asked(tmp_path: Path) -> None:
+@pytest.mark.parametrize("metres", ["1", "0.01"])
+def test_blender_s_watts_are_told_and_read_when_asked(tmp_path: Path, metres: str) -> None:
     """The 1000 cd of a glTF are 1000 4 pi / 683 W in Blender, which writes W / pi with normalize
-    1; a sun of 0.25 lx is 0.25 / 683 W/m2, which it writes over 4.
+    1; a sun of 0.25 lx is 0.25 / 683 W/m2, which it writes over 4. In centimetres it writes
+    the same watts, which by the letter are a 10,000th.
     """
+    head = BLENDER.replace("metersPerUnit = 1", f"metersPerUnit = {metres}")
     watts = 1000 * 4 * math.pi / 683
     stage = (
         lamp(
@@ -342,14 +345,14 @@ def test_blender_s_watts_are_told_and_read_when_asked(tmp_path: Path) -> None:
             "Sun",
         ),
     )
-    told = convert(tmp_path, *stage, head=BLENDER)
+    told = convert(tmp_path, *stage, head=head)
     assert get(light(told), "inputs:photometric:luminousIntensity") == pytest.approx(
-        1000 / 683, rel=CLOSE
+        1000 / 683 * float(metres) ** 2, rel=CLOSE
     )
     said = [str(finding) for finding in told.report if finding.code == "usd-light-writer"]
     assert ["1000 cd" in said[0], "0.25 lx" in said[1]] == [True, True]
     assert all('light_unit = "blender-watts"' in text for text in said)
-    read = convert(tmp_path, *stage, head=BLENDER, toml='[usd]\nlight_unit = "blender-watts"\n')
+    read = convert(tmp_path, *stage, head=head, toml='[usd]\nlight_unit = "blender-watts"\n')
     candela = get(light(read), "inputs:photometric:luminousIntensity")
     assert candela == pytest.approx(1000, rel=CLOSE)
     lux = get(light(read, "Sun"), "inputs:photometric:illuminance")

@@ -222,23 +222,39 @@ def test_a_stated_gloss(tmp_path: Path) -> None:
 
 def test_what_is_not_converted_is_kept_and_said(tmp_path: Path) -> None:
     tiles = paint("/World/tiles", "asset inputs:file = @wall.<UDIM>.png@")
+    negative = WALL + "\nfloat4 inputs:scale = (-1, -1, -1, 1)\nfloat4 inputs:bias = (1, 1, 1, 0)"
     samples = "color3f inputs:diffuseColor.timeSamples = { 0: (1, 1, 1), 9: (0, 0, 0) }"
     moving = paint("/World/moving", surface=samples)
     empty = 'def Material "empty"\n{\n}'
-    result = convert(tmp_path, tiles, moving, empty)
+    film = paint("/World/film", negative)
+    result = convert(tmp_path, tiles, moving, empty, film)
     kept = {f.thing for f in result.report if f.code == "usd-material-kept"}
-    assert kept == {"/World/tiles", "/World/moving", "/World/empty"}
+    assert kept == {"/World/tiles", "/World/moving", "/World/empty", "/World/film"}
     assert node(surface(result, "/World/tiles"), "diffuseColor").GetPath() == "/World/tiles/T"
 
 
-def test_pictures_in_a_package(tmp_path: Path) -> None:
+@pytest.mark.parametrize("picture", ["wood [old].png", "wood[1].png", "in [1]/wood.png"])
+def test_a_bracket_in_a_files_name_makes_no_package_of_it(tmp_path: Path, picture: str) -> None:
+    folder = tmp_path / "town [v2]"
+    png(folder / picture)
+    painted = paint("/World/paint", f"asset inputs:file = @./{picture}@")
+    stage_file(folder / "base[1].usda", painted)
+    layers = '#usda 1.0\n(\n    subLayers = [@./base[1].usda@]\n    defaultPrim = "World"\n)\n'
+    result = run(stage_file(folder / "town[1].usda", head=layers), folder / "night.usda")
+    assert texels(surface(result)) == close((1.0, 1.0, 1.0))
+    assert not result.report.codes() & {"file-missing", "file-refused"}
+
+
+@pytest.mark.parametrize(("folder", "picture"), [("", "wall.png"), ("to [1]", "wall[1].png")])
+def test_pictures_in_a_package(tmp_path: Path, folder: str, picture: str) -> None:
     loose = tmp_path / "loose"
-    png(loose / "wall.png")
-    stage_file(loose / "town.usda", paint("/World/paint", "asset inputs:file = @./wall.png@"))
-    package = tmp_path / "town.usdz"
+    png(loose / picture)
+    stage_file(loose / "town.usda", paint("/World/paint", f"asset inputs:file = @./{picture}@"))
+    package = tmp_path / folder / "town.usdz"
+    package.parent.mkdir(exist_ok=True)
     assert UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(loose / "town.usda")), str(package))
     shutil.rmtree(loose)
-    result = run(package, tmp_path / "night.usda")
+    result = run(package, package.with_name("night.usda"))
     assert texels(surface(result)) == close((1.0, 1.0, 1.0))
     root = Sdf.Layer.FindOrOpen(str(result.output))
     assert list(root.subLayerPaths) == ["./night.photometry.usda", "./town.usdz"]

@@ -20,16 +20,16 @@ PACKAGES = {"hdrusd": "hdrusd", "cli": "hdrusd.cli", "schemas": "hdrusd.schemas"
 #: "" is hdrusd/__init__ itself.
 LAYERS = (
     {"", "errors", "units"},
-    {"frames", "input_file", "leftovers", "registry", "report"},
+    {"columns", "frames", "input_file", "leftovers", "registry", "report"},
     {"colour", "schemas", "legacy", "scene"},
     {"eye"},
     {"glare", "photometry", "tonemap"},
     {"importers", "images"},
     {"usd", "gpu", "bracket", "contact_sheet", "course", "plots", "video"}
-    | {"frame_header", "frame_io", "map_threads"},
+    | {"frame_header", "frame_io", "map_threads", "texture_names"},
     {"account", "adaptation_log", "added_lamps", "candela_plot", "delivery", "inspection"}
-    | {"job", "luminaires", "maps", "recipe", "skies", "validation", "viewing"},
-    {"by_products", "conversion", "lamps", "resuming", "surfaces"},
+    | {"job", "luminaires", "maps", "measures", "recipe", "skies", "validation", "viewing"},
+    {"by_products", "checking", "conversion", "lamps", "resuming", "surfaces"},
     {"display", "overlay"},
     {"convert", "render"},
     {"batch", "testing"},
@@ -38,7 +38,17 @@ LAYERS = (
 
 #: Who may import what does not come with Python; NumPy is everybody's.
 THIRD_PARTY = {
-    "pxr": {"schemas", "usd", "validation", "convert", "lamps", "overlay", "recipe", "render"},
+    "pxr": {
+        "schemas",
+        "usd",
+        "validation",
+        "checking",
+        "convert",
+        "lamps",
+        "overlay",
+        "recipe",
+        "render",
+    },
     "moderngl": {"gpu", "render", "viewing"},
     "OpenEXR": {"images"},
     "OpenImageIO": {"bracket", "contact_sheet", "images"},

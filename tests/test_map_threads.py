@@ -33,7 +33,7 @@ def pictures(folder: Path, count: int = 12) -> list[Image]:
 def written(folder: Path, images: list[Image], *, threads: bool) -> tuple[dict[str, bytes], Report]:
     """The files by name, and the findings."""
     report = Report()
-    maps = MapWriter(folder, "maps", report)
+    maps = MapWriter(folder, "maps", folder.parent, report)
 
     def write() -> None:
         for image in images:
@@ -83,7 +83,7 @@ def test_large_pictures_wait_for_their_turn(
 def test_what_cannot_be_written_comes_out(tmp_path: Path) -> None:
     images = pictures(tmp_path, 3)
     (tmp_path / "maps").write_text("no folder")
-    maps = MapWriter(tmp_path / "maps", "maps", Report())
+    maps = MapWriter(tmp_path / "maps", "maps", tmp_path, Report())
     with pytest.raises(OSError, match="maps"), maps.threaded(images):
         maps.reflectance(Texture(images[0]), (1.0, 1.0, 1.0), 2.2, PLACE, "paint")
 

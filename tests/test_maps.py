@@ -11,13 +11,14 @@ import pytest
 from builders import picture
 
 from hdrusd import maps as maps_module
+from hdrusd import texture_names
 from hdrusd.legacy.scene import Image, Texture
 from hdrusd.maps import MapWriter
 from hdrusd.report import Report
 
 
 def writer(folder: Path) -> MapWriter:
-    return MapWriter(folder, "./a.textures", Report())
+    return MapWriter(folder, "./a.textures", folder, Report())
 
 
 def noise(seed: int, channels: int = 3) -> Image:
@@ -35,7 +36,7 @@ def test_a_picture_in_memory_is_hashed_once(
         hashed.append(len(data))
         return plain(data)
 
-    monkeypatch.setattr(maps_module.hashlib, "sha256", sha256)
+    monkeypatch.setattr(texture_names.hashlib, "sha256", sha256)
     maps, image = writer(tmp_path), noise(1)
     for _ in range(5):
         maps.look(Texture(image))

@@ -20,7 +20,9 @@ from hypothesis import strategies as st
 from hdrusd.cli.main import hdrusd
 from hdrusd.legacy.scene import TRS, LegacyScene, Subset
 from hdrusd.photometry.lamp_classes import BY_NAME
-from hdrusd.recipe.evidence import Lead, leads, stem
+from hdrusd.recipe.evidence import leads
+from hdrusd.recipe.lead import Lead
+from hdrusd.recipe.naming import stem
 from hdrusd.recipe.text import quoted, recipe
 
 
@@ -147,10 +149,14 @@ def test_a_post_that_glows_by_its_map_has_its_lamp_where_the_map_is_bright() -> 
 def test_a_post_by_its_name_is_a_suspicion_with_its_top() -> None:
     points = np.array([[0, 0, 0], [2, 0, 0], [2, 7, 0], [0, 7, 0]], np.float32)
     part = node("mesh", transform=TRS((0.0, 1.0, 0.0)), meshes=[0])
-    post = node("Lamppost_02", transform=TRS((100.0, 0.0, 0.0)), children=[part])
-    scene = one_square(meshes=[square(points=points)], roots=[post])
-    lead = found(scene)["lamp Lamppost_*"]
-    assert (lead.offset, lead.counts) == ((1.0, 8.0, 0.0), False)
+    posts = [
+        node(f"Lamppost_0{n}", transform=TRS((100.0 * n, 0.0, 0.0)), children=[part])
+        for n in (1, 2)
+    ]
+    scene = one_square(meshes=[square(points=points)], roots=posts)
+    (lead,) = found(scene).values()
+    assert (lead.section, lead.pattern) == ("lamp", "Lamppost_*")
+    assert (lead.offset, lead.counts, lead.count) == ((1.0, 8.0, 0.0), False, 2)
 
 
 def test_a_painted_lamp_is_a_suspicion() -> None:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 import pytest
 from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade
 
+from hdrusd.checking import validate
 from hdrusd.errors import SourceRef
 from hdrusd.images import read_image
 from hdrusd.job import Job
@@ -22,7 +23,6 @@ from hdrusd.render import render_sequence
 from hdrusd.report import Report
 from hdrusd.scene import Camera
 from hdrusd.usd.extract import StageReader
-from hdrusd.validation import validate
 
 SCRIPT = Path(__file__).parents[1] / "samples" / "eye" / "make_sequences.py"
 FPS = 24

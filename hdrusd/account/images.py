@@ -8,10 +8,11 @@ that is called an emission map is a lamp that stays dark.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any
 
-from hdrusd.legacy.scene import Material
+from hdrusd.legacy.pictures import picture_names
+from hdrusd.legacy.scene import Image, Material
 from hdrusd.photometry.albedo import words
 from hdrusd.usd.material import Surface
 
@@ -45,53 +46,65 @@ def image_rows(
     materials: Sequence[Material],
     surfaces: Sequence[Surface],
     areas: Sequence[float],
-    written: Mapping[str, Mapping[str, object]],
+    made_of: Mapping[str, Image],
+    broken: Callable[[Image], bool],
 ) -> list[dict[str, Any]]:
-    """A row for each picture by name. ``areas``: m2 that wear each material; ``written``: the
-    files of the conversion and the image that each was made from.
+    """A row for each picture, however many names it has. ``areas``: m2 that wear each material;
+    ``made_of``: the files of the conversion and the image that each was made from; ``broken``:
+    whether a picture that is there could not be decoded.
     """
-    rows: dict[str, dict[str, Any]] = {}
+    used = [texture.image for material in materials for texture in material.maps().values()]
+    names, said = picture_names(used), {image.name for image in used}
+    rows: dict[Hashable, dict[str, Any]] = {}
     total = sum(areas)
     triples = zip(materials, surfaces, areas, strict=True)
     for number, (material, surface, area) in enumerate(triples):
         share = area / total if total > 0.0 else 0.0
         for name, texture in material.maps().items():
-            row = _row(rows, texture.image.name, str(texture.image.source))
+            image, key = texture.image, texture.image.key()
+            row = _row(rows, key, names[key], str(image.source))
+            row["called"].setdefault(image.name)
             row["uses"].add(_use(name, surface))
-            row["missing"] |= texture.image.missing
+            row["missing"] |= image.missing
+            row["broken"] |= broken(image)
             wearers = row["materials"].setdefault(material.name, set())
             if number not in wearers:
                 wearers.add(number)
                 row["share"] += share
     for material in materials:
         for key, name in _noted(material.extras):
-            if name not in rows:
-                row = _row(rows, name, str(material.source))
+            if name not in rows and name not in said:
+                row = _row(rows, name, name, str(material.source))
                 row["meant"] = _meant(key, name)
                 row["materials"][material.name] = set()
-    for file, made in written.items():
-        if made.get("image") in rows:
-            rows[str(made["image"])]["files"].append(file)
+    for file, image in made_of.items():
+        if image.key() in rows:
+            rows[image.key()]["files"].append(file)
     for row in rows.values():
-        uses = row.pop("uses")
+        uses, called = row.pop("uses"), row.pop("called")
+        row["also_called"] = [*called][1:]
         row["materials"] = list(row["materials"])
         row["class"] = next((c for c in CLASSES if c in uses), "unused")
         row["also"] = [c for c in CLASSES if c in uses and c != row["class"]]
     return list(rows.values())
 
 
-def _row(rows: dict[str, dict[str, Any]], name: str, place: str) -> dict[str, Any]:
+def _row(
+    rows: dict[Hashable, dict[str, Any]], key: Hashable, name: str, place: str
+) -> dict[str, Any]:
     empty: dict[str, Any] = {
         "name": name,
+        "called": {},  # in the source, in its order
         "place": place,
         "uses": set(),
         "meant": None,
         "missing": False,
+        "broken": False,
         "materials": {},  # by name, which need not be unique: numbers
         "share": 0.0,
         "files": [],
     }
-    return rows.setdefault(name, empty)
+    return rows.setdefault(key, empty)
 
 
 def _use(name: str, surface: Surface) -> str:

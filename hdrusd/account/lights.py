@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
-from collections.abc import Mapping, Sequence
-from glob import escape
-from itertools import takewhile
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from hdrusd.legacy.scene import Light
 from hdrusd.photometry.confidence import confidence
 from hdrusd.photometry.flux import flux
 from hdrusd.photometry.light import PhotometricLight
+from hdrusd.photometry.match_patterns import Patterns, Thing
 from hdrusd.units import sphere_luminance
 
 #: Units of ``value`` by kind; with a photometric file it is a factor.
@@ -19,9 +17,6 @@ UNITS = {"point": "cd", "spot": "cd", "distant": "lx", "ambient": "lx"}
 
 #: Of a light with a photometric file.
 FACTOR = "times the file"
-
-#: The last of all characters.
-_LAST = chr(0x10FFFF)
 
 
 def light_row(
@@ -40,9 +35,11 @@ def light_row(
     times its factor; ``level``: of what comes from afar the share that a level ground gets.
 
     ``value`` and ``luminance_cd_m2`` are of one lamp, ``flux_lm`` of one too; ``lamps`` is how
-    many there are.
+    many there are, ``lamps_shown`` how many of them the selected states show: all, until somebody
+    has looked.
     """
     local = light.kind in ("point", "spot")
+    lamps = places * (1 if source is None else source.lamps)
     lumens = file_flux if light.profile else flux(light)
     seen = local and not light.profile and light.radius > 0.0
     return {
@@ -51,7 +48,8 @@ def light_row(
         "place": place,
         "node": node,
         "kind": light.kind,
-        "lamps": places * (1 if source is None else source.lamps),
+        "lamps": lamps,
+        "lamps_shown": lamps,
         "value": light.intensity,
         "unit": FACTOR if light.profile else UNITS[light.kind],
         "chromaticity": list(light.chromaticity),
@@ -101,44 +99,15 @@ def group_name(group: Sequence[Mapping[str, Any]]) -> str:
     return first if first == last else f"{first} ... {last}"
 
 
-def all_names(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What patterns of the photometry file may fit, sorted: names of lights and of their nodes."""
-    return sorted(name for row in rows for name in _names(row))
+def pattern_finder(
+    rows: Sequence[Mapping[str, Any]],
+) -> Callable[[Sequence[Mapping[str, Any]]], list[str]]:
+    """Of a group of ``rows`` the patterns of the photometry file that fit it and no other row."""
+    things = [Thing((str(row["name"]), str(row["node"])), str(row["path"])) for row in rows]
+    patterns, numbers = Patterns(things), {id(row): number for number, row in enumerate(rows)}
 
+    def find(group: Sequence[Mapping[str, Any]]) -> list[str]:
+        found, _ = patterns.of([numbers[id(row)] for row in group])
+        return [pattern for pattern, _ in found]
 
-def group_patterns(group: Sequence[Mapping[str, Any]], everything: Sequence[str]) -> list[str]:
-    """Shell patterns of the photometry file that fit a group and nothing else, few if that can be.
-
-    ``everything``: ``all_names``. Lights that share a name with others go by their paths.
-    """
-    names = sorted({str(row["name"]) for row in group})
-    if len(names) > 1:
-        pairs = zip(names[0], names[-1], strict=False)
-        same = "".join(a for a, _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
-        stem = same.rstrip("0123456789")
-        if stem and _only(group, everything, stem, stem + _LAST):
-            return [f"{escape(stem)}*"]
-        if stem and _only(group, everything, stem + "0", stem + ":"):
-            return [f"{escape(stem)}[0-9]*"]
-    by_name: dict[str, list[Mapping[str, Any]]] = {}
-    for row in group:
-        by_name.setdefault(str(row["name"]), []).append(row)
-    found: list[str] = []
-    for name, rows in by_name.items():
-        if _only(rows, everything, name, name + "\0"):
-            found.append(escape(name))
-        else:
-            found += [escape(row["path"]) for row in rows]
-    return found
-
-
-def _names(row: Mapping[str, Any]) -> set[str]:
-    return {str(row["name"]), str(row["node"])} - {""}
-
-
-def _only(
-    rows: Sequence[Mapping[str, Any]], everything: Sequence[str], first: str, end: str
-) -> bool:
-    """Whether what stands from ``first`` up to ``end`` among sorted names is all of these rows."""
-    own = [sum(first <= name < end for name in _names(row)) for row in rows]
-    return all(own) and sum(own) == bisect_left(everything, end) - bisect_left(everything, first)
+    return find

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hdrusd.account.fix_first import MOST, PHOTOMETRY
-from hdrusd.photometry.sidecar import Unmatched
+from hdrusd.account.fix import MOST, PHOTOMETRY
+from hdrusd.photometry.sidecar import STATED_ITSELF, Unmatched
 
 Row = Mapping[str, Any]
 
@@ -58,11 +58,14 @@ def unused_patterns(rows: Sequence[Converted]) -> list[Unmatched]:
         if row.photometry is not None and row.shared and not row.code:
             sharing[row.photometry].append({_by_place(u) for u in row.unmatched})
     common = (set.intersection(*sets) for sets in sharing.values())
-    return sorted((u for found in common for u in found), key=lambda u: str(u.place))
+    unused = (pattern for found in common for pattern in found)
+    return sorted(unused, key=lambda u: (u.place.file, str(u.place), u.pattern))
 
 
 def _by_place(pattern: Unmatched) -> Unmatched:
     """Why it fits nothing may differ from file to file."""
+    if pattern.text == STATED_ITSELF:
+        return pattern
     return Unmatched(pattern.place, pattern.pattern, "nothing of that name in any of its files")
 
 
@@ -138,8 +141,9 @@ def _totals(rows: Iterable[Row]) -> dict[str, Any]:
         for row in rows:
             counts.update(row[key])
         sums[key] = dict(counts.most_common())
-    for key in next(iter(rows), {}).keys() - {*_BY_NAME, "flux_lm"}:
-        sums[key] = sum(row[key] for row in rows)
+    for key in next(iter(rows), {}):
+        if key not in (*_BY_NAME, "flux_lm"):
+            sums[key] = sum(row[key] for row in rows)
     known = [row["flux_lm"] for row in rows if row["flux_lm"] is not None]
     return sums | {"flux_lm": float(sum(known)) if known else None}
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from hdrusd.account.wear import Worn
 from hdrusd.errors import SourceRef
-from hdrusd.legacy.scene import Image, Material
+from hdrusd.legacy.scene import Image, Material, Texture
 from hdrusd.legacy.texels import texels
 from hdrusd.photometry.albedo import (
     Doubt,
@@ -111,15 +111,53 @@ class Reflectances:
         made = self.picture(texture.image, surface.gamma, None if uv is None else places)
         if made is None:
             return None
-        pixels, alpha = made
-        values, weights = pixels.reshape(-1, 3), np.ones(pixels.shape[0] * pixels.shape[1])
-        seen = None if alpha is None else alpha.ravel()
+        pixels, _ = made
+        values = pixels.reshape(-1, 3)
         if uv is not None:
             values = values * shown[:, None]
             values = values if color is None else values * color
-        if seen is not None and material.alpha_mode != "opaque":
-            weights = seen if material.alpha_mode == "blend" else seen > material.alpha_cutoff
-        return reflectance(values * diffuse, weights.astype(np.float64))
+        weights = self._weights(material, surface, texture, uv, pixels.shape[:2])
+        return reflectance(values * diffuse, weights)
+
+    def _weights(
+        self,
+        material: Material,
+        surface: Surface,
+        texture: Texture,
+        uv: Array | None,
+        shape: tuple[int, ...],
+    ) -> Array:
+        """How much of each of the places (n,) is there, by the material's opacity map.
+
+        ``shape``: height and width of the reflectance's picture where ``uv`` is None: the places
+        are its texels then.
+        """
+        whole = np.ones(shape[0] * shape[1])
+        used = surface.opacity_map.texture if surface.opacity_map else None
+        if used is None or (uv is not None and used.uv_set != texture.uv_set):
+            return whole
+        shown = whole
+
+        def places(width: int, height: int) -> tuple[Array, Array]:
+            nonlocal shown
+            if uv is not None:
+                row, column, shown = texels(used, uv, width, height)
+                return row, column
+            row, column = np.indices(shape)
+            return row.ravel() * height // shape[0], column.ravel() * width // shape[1]
+
+        made = self.picture(used.image, 1.0, places)  # read raw, as the stage has it
+        if made is None:
+            return whole
+        pixels, alpha = made
+        if used.channel == "a":
+            opacity = whole if alpha is None else alpha.ravel()
+        else:
+            opacity = pixels.reshape(-1, 3)[:, "rgb".index(used.channel[0])]
+        opacity = np.clip(opacity * shown * material.alpha, 0.0, 1.0)
+        if material.alpha_mode == "mask":
+            return np.asarray(opacity >= material.alpha_cutoff, np.float64)
+        return np.asarray(opacity, np.float64)
 
     def _told(
         self, material: Material, surface: Surface, wrong: Doubt, factor: Sequence[float] | None
@@ -135,6 +173,7 @@ class Reflectances:
         self.report.add(Kind.ASSUMED, wrong.code, material.source, material.name, text)
         return {
             "code": wrong.code,
+            "statistic": wrong.statistic,
             "low": wrong.low,
             "high": wrong.high,
             "citation": wrong.citation,
@@ -179,6 +218,7 @@ class Reflectances:
         self.report.add(Kind.ASSUMED, code, source, material.name, text)
         return {
             "code": code,
+            "statistic": None,
             "low": None,
             "high": None,
             "citation": None,

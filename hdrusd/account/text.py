@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from textwrap import wrap
 from typing import Any
 
-from hdrusd.account.fix_first import COMMAND, PHOTOMETRY, SOURCE
+from hdrusd.account.fix import COMMAND, PHOTOMETRY, SOURCE
 from hdrusd.account.lights import FACTOR, group_name, grouped
+from hdrusd.columns import columns, cut, padded, wrapped
 from hdrusd.errors import one_line
 
 #: Rows of lights and entries of what to fix that are shown; the report has all.
@@ -22,20 +23,20 @@ _NARROWEST, _WIDEST = 60, 120
 _MORE = "--report FILE has all"
 
 
-def summary(document: Mapping[str, Any], columns: int) -> list[str]:
-    """Lines of at most ``columns`` characters (60 to 120). ``document``: ``Result.as_dict``."""
-    width = min(max(columns, _NARROWEST), _WIDEST)
+def summary(document: Mapping[str, Any], screen: int) -> list[str]:
+    """Lines of at most ``screen`` columns (60 to 120). ``document``: ``Result.as_dict``."""
+    width = min(max(screen, _NARROWEST), _WIDEST)
     lines = [
         *_lights(document["lights"], document["totals"], width),
         *_surfaces(document["totals"]),
         *_fixes(document["fix_first"], width),
     ]
-    return [_cut(line, width) for line in lines]
+    return [cut(line, width) for line in lines]
 
 
-def batch_summary(document: Mapping[str, Any], columns: int) -> list[str]:
+def batch_summary(document: Mapping[str, Any], screen: int) -> list[str]:
     """As ``summary``, of ``batch_document``."""
-    width = min(max(columns, _NARROWEST), _WIDEST)
+    width = min(max(screen, _NARROWEST), _WIDEST)
     totals = document["totals"]
     lines = [document["summary"]]
     lines += [
@@ -47,7 +48,7 @@ def batch_summary(document: Mapping[str, Any], columns: int) -> list[str]:
         lines.append(f"  and {left} more code{'s' if left > 1 else ''}; {_MORE}")
     for unused in document["unused_patterns"]:
         said = one_line(f"{unused['place']}: {unused['pattern']}: {unused['text']}")
-        lines += wrap(said, width, subsequent_indent="  ", break_on_hyphens=False)
+        lines += wrapped(said, width, "  ")
     if totals["converted"]:
         lines += [_sum_of_lights(totals), *_surfaces(totals)]
         entries = [
@@ -55,7 +56,7 @@ def batch_summary(document: Mapping[str, Any], columns: int) -> list[str]:
             for entry in document["fix_first"]
         ]
         lines += _fixes(entries, width)
-    return [_cut(line, width) for line in lines]
+    return [cut(line, width) for line in lines]
 
 
 def _files(count: int) -> str:
@@ -65,31 +66,33 @@ def _files(count: int) -> str:
 def _lights(
     rows: Sequence[Mapping[str, Any]], totals: Mapping[str, Any], width: int
 ) -> Iterator[str]:
-    if not rows:
-        yield "lights: none"
-        return
     yield _sum_of_lights(totals)
+    rows = [row for row in rows if row["lamps_shown"]]
+    if not rows:
+        return
     groups = sorted(grouped(rows), key=_strength, reverse=True)
     cells = [("", "source says", "rule", "result", "confidence"), *map(_cells, groups[:LIGHTS])]
-    widths = [max(len(row[i]) for row in cells) for i in range(5)]
+    widths = [max(columns(row[i]) for row in cells) for i in range(5)]
     # What is too wide loses in its names and rules, which the report has in full.
     for column in (2, 0, 1):
         over = sum(widths) + 2 * 5 - width
         widths[column] = max(min(widths[column], 12), widths[column] - max(over, 0))
     for row in cells:
-        parts = (f"{_cut(cell, n):<{n}}" for cell, n in zip(row, widths, strict=True))
+        parts = (padded(cell, n) for cell, n in zip(row, widths, strict=True))
         yield f"  {'  '.join(parts)}".rstrip()
     if len(groups) > LIGHTS:
         yield f"  and {sum(map(len, groups[LIGHTS:]))} more; {_MORE}"
 
 
 def _sum_of_lights(totals: Mapping[str, Any]) -> str:
+    hidden = totals["lamps_not_shown"]
+    more = f"; {hidden} more in states not shown" if hidden else ""
     if not totals["lamps"]:
-        return "lights: none"
+        return f"lights: none{more}"
     lumens = totals["flux_lm"]
     trust = ", ".join(f"{n} {c}" for c, n in totals["lamps_by_confidence"].items())
     flux = "" if lumens is None else f", {lumens:.4g} lm"
-    return f"lights: {lights_and_skies(totals)}{flux}; confidence: {trust}"
+    return f"lights: {lights_and_skies(totals)}{flux}{more}; confidence: {trust}"
 
 
 def lights_and_skies(totals: Mapping[str, Any]) -> str:
@@ -99,12 +102,12 @@ def lights_and_skies(totals: Mapping[str, Any]) -> str:
 
 
 def _strength(group: Sequence[Mapping[str, Any]]) -> float:
-    return float(sum((row["flux_lm"] or row["value"]) * row["lamps"] for row in group))
+    return float(sum((row["flux_lm"] or row["value"]) * row["lamps_shown"] for row in group))
 
 
 def _cells(group: Sequence[Mapping[str, Any]]) -> tuple[str, str, str, str, str]:
     row = group[0]
-    lamps = sum(r["lamps"] for r in group)
+    lamps = sum(r["lamps_shown"] for r in group)
     name = one_line(group_name(group)) + (f" ({lamps})" if lamps > 1 else "")
     said = row["source_value"]
     if said is None:
@@ -122,9 +125,9 @@ def _cells(group: Sequence[Mapping[str, Any]]) -> tuple[str, str, str, str, str]
 
 def _surfaces(totals: Mapping[str, Any]) -> Iterator[str]:
     classes = ", ".join(f"{n} {c}" for c, n in totals["textures_by_class"].items())
-    lost = totals["textures_missing"]
-    missing = f" ({lost} missing)" if lost else ""
-    yield f"textures: {classes or 'none'}{missing}"
+    counts = {word: totals[f"textures_{word}"] for word in ("missing", "broken")}
+    lost = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
+    yield f"textures: {classes or 'none'}" + (f" ({lost})" if lost else "")
     yield (
         f"reflectances: {totals['materials_judged']} of {totals['materials']} materials judged, "
         f"{totals['materials_doubted']} doubted"
@@ -136,20 +139,18 @@ def _fixes(entries: Sequence[Mapping[str, Any]], width: int) -> Iterator[str]:
         return
     yield "what to fix first:"
     for entry in entries[:ENTRIES]:
-        yield _cut(f"  {entry['rank']}. {one_line(entry['what'])}", width)
-        yield from (f"     {line}" for line in wrap(one_line(entry["why"]), width - 5)[:2])
+        yield cut(f"  {entry['rank']}. {one_line(entry['what'])}", width)
+        yield from (f"     {line}" for line in wrapped(one_line(entry["why"]), width - 5)[:2])
         if entry["write"]:
-            head, _, body = entry["write"].partition("\n")
+            one, *more = re.split(r"\n(?=\[\[|#)", entry["write"])
+            head, _, body = one.partition("\n")
             told = f"{entry['where']}: {head} {', '.join(body.splitlines())}".rstrip()
+            told += f"; {_MORE}" if more else ""
         elif entry["where"] not in (PHOTOMETRY, COMMAND, SOURCE):
             told = entry["where"]  # which photometry file of a batch
         else:
             continue
-        lines = wrap(one_line(told), width - 5, break_on_hyphens=False)[:2]
+        lines = wrapped(one_line(told), width - 5)[:2]
         yield from (f"     {line}" for line in lines)
     if len(entries) > ENTRIES:
         yield f"  and {len(entries) - ENTRIES} more; {_MORE}"
-
-
-def _cut(text: str, width: int) -> str:
-    return text if len(text) <= width else f"{text[: width - 3]}..."

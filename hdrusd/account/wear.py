@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.legacy.scene import LegacyScene, Mesh, Texture
+from hdrusd.usd.placed_area import PlacedArea
 from hdrusd.usd.triangles import Corners, corners
 
 Array = npt.NDArray[Any]
@@ -41,7 +42,7 @@ class Worn:
 class _Part:
     mesh: Mesh
     faces: npt.NDArray[np.bool_]  # (f,), which of them wear it
-    scale: float  # m2 of all copies together a square unit of the mesh
+    placed: PlacedArea  # where it stands
 
 
 def wearers(scene: LegacyScene) -> dict[int | None, list[int]]:
@@ -54,20 +55,19 @@ def wearers(scene: LegacyScene) -> dict[int | None, list[int]]:
 
 
 def worn(
-    scene: LegacyScene, scales: Mapping[int, float], material: int, meshes: Sequence[int]
+    scene: LegacyScene, placed: Mapping[int, PlacedArea], material: int, meshes: Sequence[int]
 ) -> Worn:
-    """How a material is worn. ``scales``: m2 a square unit of each mesh, summed over its copies;
-    ``meshes``: those that have it (``wearers``).
+    """How a material is worn. ``placed``: what its places make of each mesh that is shown;
+    ``meshes``: those that have the material (``wearers``).
     """
-    parts = [
-        _Part(scene.meshes[index], faces, scales.get(index, 0.0))
-        for index in meshes
-        if (faces := scene.meshes[index].wears(material)).any()
-    ]
-    shown = [part for part in parts if part.scale > 0.0]
-    count = sum(int(part.faces.sum()) for part in parts)
+    count, parts = 0, []
+    for index in meshes:
+        faces = scene.meshes[index].wears(material)
+        count += int(faces.sum())
+        if index in placed and faces.any():
+            parts.append(_Part(scene.meshes[index], faces, placed[index]))
     texture = scene.materials[material].diffuse_map
-    pieces = [_Piece.of(part, texture) for part in shown]
+    pieces = [_Piece.of(part, texture) for part in parts]
     area = float(sum(piece.areas.sum() for piece in pieces))
     if not (0.0 < area < np.inf):
         return Worn(count, 0.0, None, None)
@@ -88,7 +88,7 @@ class _Piece:
         triangles = corners(mesh.face_counts, mesh.face_indices, left_handed=False)
         triangles = triangles.select(part.faces)
         a, b, c = np.moveaxis(mesh.points[triangles.vertex].astype(np.float64), 1, 0)
-        areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=-1) * part.scale
+        areas = part.placed.of(0.5 * np.cross(b - a, c - a))
         uv = None
         if texture is not None and texture.uv_set in mesh.uvs:
             uv = _at_corners(triangles, *mesh.uvs[texture.uv_set])

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, count
 from pathlib import Path
 
+from hdrusd.delivery import is_own, places
 from hdrusd.errors import InputError, one_line
 from hdrusd.importers.importer import SUFFIXES
 from hdrusd.photometry.sidecar import FILE_NAME
@@ -18,11 +20,6 @@ DATABASES = {*SUFFIXES, *STAGES}
 
 #: What a stage's name may not end in: its layers are named so.
 _LAYERS = (".geometry", ".look", ".photometry")
-
-#: The suffix of what hdrusd writes, the layer that is always there, and what stands in its head.
-_OWN, _OWN_LAYER = ".usda", ".photometry.usda"
-_MARK, _HEAD = b'authorship:hdrusd:softwarePackage = "hdrusd"', 1 << 16
-_EMPTY = b"#usda 1.0"
 
 #: Paths that a line of what was passed over names.
 _NAMED = 3
@@ -51,29 +48,35 @@ def plan(
     ``output``, what earlier conversions wrote, and links to folders or out of the folder are
     passed over; of the latter three ``tell`` hears a line each. The tree below the folder, or
     below the folder that all sources share, is the tree below ``output``. Two sources that would
-    become one stage, whatever the case of their names, carry their suffix in it.
-    Raises InputError where there is nothing to do.
+    become one stage, whatever the case of their names, carry their suffix in it; who would still
+    write where another one writes or is read, a number.
+    Raises InputError where there is nothing to do, and for a place outside ``output``.
     """
-    found = [pair for source in sources for pair in _databases(source, output.resolve(), tell)]
+    home = output.resolve()
+    found = [pair for source in sources for pair in _databases(source, home, tell)]
     if not found:
         suffixes = " ".join(sorted(DATABASES))
         raise InputError(sources[0], f"no database in it; want files that end in {suffixes}")
-    unique = {file.absolute(): (file, root) for file, root in found}
+    unique = {_absolute(file.parent) / file.name: (file, root) for file, root in found}
     base = _common_folder([root or file.parent for file, root in unique.values()])
-    places = {file: file.absolute().relative_to(base) for file, _ in unique.values()}
-    shared = Counter(_key(place) for place in places.values())
+    stages = _stages({f: place.relative_to(base) for place, (f, _) in unique.items()}, home)
     recipes = {file: photometry or _nearest(file, root) for file, root in unique.values()}
     speaks_of = Counter(recipes.values())
     tasks = [
         Task(
             source=file,
-            output=output / _stage(places[file], shared),
+            output=output / stages[file],
             photometry=recipes[file],
             shared=recipes[file] is not None and speaks_of[recipes[file]] > 1,
             root=root,
         )
         for file, root in unique.values()
     ]
+    for task in tasks:
+        place = task.output.parent.resolve()
+        if not place.is_relative_to(home):
+            text = f"would be converted into {place}, outside {output}; want a folder without links"
+            raise InputError(task.source, text)
     return sorted(tasks, key=lambda task: task.source)
 
 
@@ -86,9 +89,10 @@ def _databases(
     home = source.resolve()
     passed_over: dict[str, list[Path]] = defaultdict(list)
     for folder, folders, files in os.walk(source):
+        files.sort()
         folders[:] = [
             name
-            for name in folders
+            for name in sorted(folders)
             if not name.startswith(".") and (Path(folder) / name).resolve() != output
         ]
         links = (Path(folder) / name for name in folders)
@@ -99,7 +103,7 @@ def _databases(
                 continue
             if not file.resolve().is_relative_to(home):
                 passed_over["links that lead out of it"].append(file)
-            elif _is_own(file):
+            elif is_own(file):
                 passed_over["stages and layers that hdrusd wrote"].append(file)
             else:
                 yield file, source
@@ -110,38 +114,41 @@ def _databases(
             tell(f"{source}: passed over, {what}: {len(names)} ({', '.join(names[:_NAMED])}{more})")
 
 
-def _is_own(file: Path) -> bool:
-    """Whether a conversion wrote this stage, or this layer of one: converting it once more would
-    take reflectance for pictures, and each run would find more.
-    """
-    stem = file.stem if file.suffix == _OWN else ""
-    for layer in ("geometry.usdc", "look.usda", "photometry.usda"):
-        if file.name.endswith(f".{layer}"):
-            stem = file.name.removesuffix(f".{layer}")
-    if not stem:
-        return False
-    try:
-        photometry = _head(file.with_name(f"{stem}{_OWN_LAYER}"))
-        if photometry.strip() == _EMPTY:  # over a stage without lights and materials
-            return f"@./{stem}{_OWN_LAYER}@".encode() in _head(file.with_name(f"{stem}{_OWN}"))
-    except OSError:
-        return False
-    return _MARK in photometry
-
-
-def _head(file: Path) -> bytes:
-    if file.is_symlink() or not file.is_file():  # a pipe would never end
-        return b""
-    with file.open("rb") as opened:
-        return opened.read(_HEAD)
+def _absolute(folder: Path) -> Path:
+    """As it is called, but for ``..``: behind a link that is the folder above where it leads."""
+    return folder.resolve() if ".." in folder.parts else folder.absolute()
 
 
 def _common_folder(folders: Sequence[Path]) -> Path:
-    return Path(os.path.commonpath([folder.absolute() for folder in folders]))
+    return Path(os.path.commonpath([_absolute(folder) for folder in folders]))
+
+
+def _stages(sources: Mapping[Path, Path], home: Path) -> dict[Path, Path]:
+    """The stage of each source, both relative. ``sources``: files and their places in the tree."""
+    shared = Counter(_key(place) for place in sources.values())
+    first = {file: _stage(place, shared) for file, place in sources.items()}
+    owners: dict[str, Path | None] = {_folded(file.resolve()): file for file in sources}
+    for place in sources.values():
+        owners |= dict.fromkeys((_folded(home / folder) for folder in place.parents), None)
+    stages: dict[Path, Path] = {}
+    # Who has its own name keeps it.
+    for file in sorted(sources, key=lambda f: (first[f].stem != sources[f].stem, sources[f])):
+        numbered = (first[file].with_stem(f"{first[file].stem}_{n}") for n in count(2))
+        for stage in chain([first[file]], numbered):
+            wanted = [_folded(place) for place in places(home / stage)]
+            if all(owners.get(place, file) == file for place in wanted):
+                break
+        owners |= dict.fromkeys(wanted, file)
+        stages[file] = stage
+    return stages
+
+
+def _folded(path: Path) -> str:
+    return str(path).casefold()
 
 
 def _key(place: Path) -> str:
-    return str(place.with_suffix("")).casefold()
+    return _folded(place.with_suffix(""))
 
 
 def _stage(place: Path, shared: Counter[str]) -> Path:

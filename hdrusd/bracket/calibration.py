@@ -11,7 +11,14 @@ import numpy.typing as npt
 from hdrusd.bracket.photographs import Stated
 from hdrusd.colour import luminance
 from hdrusd.errors import HdrusdError, ParameterError, SourceRef
-from hdrusd.photometry.bracketing import CAMERA_CONSTANT, camera_factor, disc, factor_of
+from hdrusd.photometry.bracketing import (
+    BETWEEN,
+    CAMERA_CONSTANT,
+    TOO_BRIGHT,
+    camera_factor,
+    disc,
+    factor_of,
+)
 from hdrusd.photometry.response import Response
 from hdrusd.report import Kind, Report
 
@@ -70,8 +77,11 @@ class Calibration:
     def check(self, stated: Stated, place: SourceRef) -> None:
         """Raise HdrusdError where neither a person nor the camera says what cd/m2 are."""
         if not (self.spots or self.candela is not None or stated.absolute):
+            why = f"no {' and '.join(stated.lacking)} in any picture"
+            if not stated.lacking:
+                why = "exposures are relative, as given"
             raise HdrusdError(
-                f"{place}: no exposure time, f-number and ISO speed to estimate cd/m2 from; "
+                f"{place}: {why}: nothing to estimate cd/m2 from; "
                 "want --spot, or --candela and --area"
             )
 
@@ -92,7 +102,7 @@ def factor(
     if wanted.spots:
         return _by_spots(light, state, wanted.spots, place, report)
     if wanted.candela is not None and wanted.area is not None:
-        return _by_candela(light, wanted, place, report)
+        return _by_candela(light, state, wanted, place, report)
     said = (
         f"camera equation L = {wanted.constant:.4g} N^2 / (t S) at code 118 (ISO 12232), estimate"
     )
@@ -140,9 +150,13 @@ def _by_spots(
 
 
 def _by_candela(
-    light: npt.NDArray[np.float32], wanted: Calibration, place: SourceRef, report: Report
+    light: npt.NDArray[np.float32],
+    state: npt.NDArray[np.uint8],
+    wanted: Calibration,
+    place: SourceRef,
+    report: Report,
 ) -> tuple[float, str]:
-    """L = I / A on average over the region."""
+    """L = I / A on average over the region. What is too dark to be held adds next to nothing."""
     assert wanted.candela is not None
     assert wanted.area is not None
     height, width = light.shape[:2]
@@ -150,6 +164,12 @@ def _by_candela(
     if not (0 <= x < x + w <= width and 0 <= y < y + h <= height):
         raise HdrusdError(
             f"{place}: region {x},{y},{w},{h}: not inside of the picture, {width} x {height}"
+        )
+    lost = int(np.count_nonzero(np.isin(state[y : y + h, x : x + w], (TOO_BRIGHT, BETWEEN))))
+    if lost:
+        text = f"{lost} of {w * h} pixels are saturated in every picture that is not noise there"
+        raise HdrusdError(
+            f"{place}: region {x},{y},{w},{h}: {text}; want a lamp that some exposure holds"
         )
     pixels = _colour(light[y : y + h, x : x + w])
     target = wanted.candela / wanted.area

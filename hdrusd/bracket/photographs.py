@@ -14,7 +14,7 @@ import numpy.typing as npt
 import OpenImageIO as oiio
 
 from hdrusd.errors import InputError, SourceRef
-from hdrusd.images import check_size
+from hdrusd.images import check_size, jpeg_ends, made_up
 from hdrusd.input_file import check_input
 from hdrusd.report import Kind, Report
 
@@ -55,6 +55,8 @@ class Photograph:
             check_size(path, spec.width, spec.height, path.stat().st_size)
             if spec.depth > 1 or spec.nchannels < 1:
                 raise InputError(path, "a volume or no channels; want a picture")
+            if not jpeg_ends(path):
+                raise InputError(path, "broken image (JPEG data without an end); want a whole file")
         except InputError:
             opened.close()
             raise
@@ -88,8 +90,9 @@ class Photograph:
             first, last = start, stop
             y = spec.y
             pixels = self._input.read_scanlines(0, 0, y + start, y + stop, 0, 0, channels, kind)
-        if pixels is None:
-            raise InputError(self.path, f"broken image ({_said(self._input.geterror())})")
+        said = self._input.geterror()
+        if pixels is None or made_up(said):
+            raise InputError(self.path, f"broken image ({_said(said)})")
         codes = np.asarray(pixels).reshape(last - first, spec.width, channels)
         codes = codes[start - first : stop - first]
         if self._float:
@@ -133,11 +136,15 @@ class Photograph:
 
 @dataclass(frozen=True, slots=True)
 class Stated:
-    """Exposures of all pictures: ``values`` in ``unit``; ``absolute`` where they are t S / N^2."""
+    """Exposures of all pictures: ``values`` in ``unit``; ``absolute`` where they are t S / N^2.
+
+    ``lacking``: what no picture states, by its name in Exif.
+    """
 
     values: tuple[float, ...]
     unit: str
     absolute: bool
+    lacking: tuple[str, ...] = ()
 
 
 def stated_exposures(
@@ -176,7 +183,7 @@ def stated_exposures(
     if len(apertures) > 1:
         text = "apertures differ; focus and shading at the edges differ with them"
         report.add(Kind.ASSUMED, "bracket-aperture", SourceRef(first), "", text)
-    return Stated(tuple(values), "s ISO / f-number^2", not lacking)
+    return Stated(tuple(values), "s ISO / f-number^2", not lacking, tuple(lacking))
 
 
 def oriented(picture: npt.NDArray[Any], orientation: int) -> npt.NDArray[Any]:
@@ -191,4 +198,4 @@ def oriented(picture: npt.NDArray[Any], orientation: int) -> npt.NDArray[Any]:
 
 
 def _said(text: str) -> str:
-    return (text.strip().splitlines() or ["unknown format"])[0]
+    return (text.strip().splitlines() or ["unknown format"])[0].partition(' ("')[0]

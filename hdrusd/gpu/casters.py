@@ -246,7 +246,7 @@ class Casters:
         uploaded = self.textures.get(use.texture)
         if uploaded is None:
             return None if use.fallback[channel] * scale + bias >= threshold else _Nothing()
-        return Cutout(use, uploaded.texture, channel, scale, bias, threshold)
+        return Cutout(use, uploaded.texture, channel, scale, bias, material.least_texel)
 
     def _named(self, kinds: Sequence[int]) -> Booleans:
         """``Group.named`` of kinds of ``Draw.shadow_links``."""

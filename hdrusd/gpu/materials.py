@@ -90,7 +90,7 @@ def material_inputs(material: Material, textures: TextureCache) -> MaterialInput
             defines["PRESENCE"] = 1
     uniforms = {
         "shininess": floats(material.shininess),
-        "opacity_threshold": floats(material.opacity_threshold),
+        "opacity_threshold": floats(material.least_texel if varies else material.opacity_threshold),
     }
     fetches = _Fetches({}, [], [], [])
     sets = material.uv_sets()
@@ -102,6 +102,8 @@ def material_inputs(material: Material, textures: TextureCache) -> MaterialInput
             if field != "normal":
                 uniforms[name] = floats(getattr(material, field))
             continue
+        if field in ("diffuse", "specular") and use.leaves_shares():
+            defines[f"{field.upper()}_HELD"] = 1
         one = "rgba"[max(use.channel, 0)]
         part = one if not is_color else "rgb" if use.channel < 0 else 3 * one
         channels = ["rgba".index(letter) for letter in part]

@@ -21,6 +21,7 @@ from hdrusd.importers.assimp_animations import read_animation
 from hdrusd.importers.assimp_materials import MaterialReader
 from hdrusd.importers.assimp_meshes import MeshReader
 from hdrusd.importers.importer import Resolver
+from hdrusd.importers.left_open import leave_open
 from hdrusd.legacy.scene import RGB, LegacyScene, Light, Node, Vec3
 from hdrusd.report import Kind, Report
 
@@ -63,8 +64,8 @@ class _SceneReader:
         """The whole scene. Raises InputError where nothing came in."""
         source, found = self.resolver.source, self.found
         scene = LegacyScene(source, source.suffix.lower().removeprefix("."), generator="assimp")
-        text = "assimp tells no unit; 1 unit is 1 m, Y is up"
-        self.report.add(Kind.ASSUMED, "assimp-axes", SourceRef(source), "", text)
+        taken = {"unit": "1 unit = 1 m", "up": "Y up"}
+        leave_open(scene, self.resolver, self.report, "assimp-axes", "assimp", **taken)
         textures = ai.records(found["textures"], found["textures_count"], ai.TEXTURE)
         materials = MaterialReader(source, self.report, textures)
         scene.materials = [

@@ -71,7 +71,7 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
         text = "the place on the globe, in its KML, is not read"
         report.add(Kind.DROPPED, "collada-element", SourceRef(resolver.source), "", text)
     root = parse(pieces, resolver.source, resolver.limits, report)
-    document = Document(resolver.source, report, resolver.limits, root)
+    document = Document(resolver.source, report, resolver.limits, root, stated=resolver.stated)
     sources = Sources(document)
     textures = TextureReader(document, resolver, archive)
     nodes = NodeReader(
@@ -103,6 +103,8 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
         skins=nodes.bent,
         up="Z" if document.up == "Z_UP" else "Y",
         unit_m=document.unit_m,
+        unit_stated=document.unit_stated,
+        up_stated=document.up_stated,
         generator=document.generator,
     )
 

@@ -1,18 +1,22 @@
 """COLLADA in a ZIP archive: .zae (its manifest names the document) and .kmz of Google Earth.
 
-COLLADA 1.5.0, appendix "zae"; the sizes that an archive declares are not believed.
+Members have whole paths, and what the document names is relative to it. COLLADA 1.5.0,
+appendix "zae"; the sizes that an archive declares are not believed.
 """
 
 from __future__ import annotations
 
 import io
+import posixpath
 import re
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from urllib.parse import unquote
 
-from hdrusd.errors import InputError
+from hdrusd.errors import InputError, SourceRef
 from hdrusd.importers.importer import Resolver
+from hdrusd.report import Kind
 
 _MAGIC = b"PK\x03\x04"
 _PIECE = 1 << 20
@@ -28,34 +32,60 @@ class Archive:
 
     def __init__(self, content: bytes, resolver: Resolver) -> None:
         self._file = resolver.source
+        self._report = resolver.report
         self._budget = min(max(_FREE, _RATIO * len(content)), resolver.limits.file_bytes)
         try:
             self._zip = zipfile.ZipFile(io.BytesIO(content))
         except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
             raise InputError(self._file, f"not a ZIP archive: {error}") from error
-        self._names: dict[str, zipfile.ZipInfo] = {}
+        self._members: dict[str, zipfile.ZipInfo] = {}  # by whole paths
         for info in self._zip.infolist():
-            name = info.filename.replace("\\", "/")
             if not info.is_dir():
-                self._names.setdefault(name.rpartition("/")[2].casefold(), info)
+                self._members.setdefault(_path("", info.filename), info)
+        self._likes = [_grouped(self._members, alike) for alike in (str.casefold, _base)]
+        self._folder = ""  # of the document
 
-    def member(self, name: str) -> bytes | None:
-        """The bytes of a member by the last part of its name; None where there is none."""
-        info = self._names.get(name.replace("\\", "/").rpartition("/")[2].casefold())
-        return None if info is None else b"".join(self._pieces(info))
+    def picture(self, references: Sequence[str], place: SourceRef, thing: str) -> bytes | None:
+        """The bytes of the member that the first of ``references`` names; None if none does.
+
+        As written, relative to the document; else, with a finding, the only one of that path
+        or of that base name without regard to case.
+        """
+        paths = [_path(self._folder, reference) for reference in references]
+        path = next((path for path in paths if path in self._members), None)
+        if path is None:
+            path = next((found for path in paths if (found := self._like(path))), None)
+            if path is None:
+                return None
+            text = f"{references[0][:200]}: not in the archive as written; {path[:200]} is used"
+            self._report.add(Kind.ASSUMED, "file-found-elsewhere", place, thing, text)
+        return b"".join(self._pieces(self._members[path]))
 
     def document(self) -> list[bytes]:
         """The COLLADA document: that of the manifest, else the first .dae."""
-        manifest = self.member("manifest.xml")
-        found = _MANIFEST.search(manifest) if manifest is not None else None
-        name = found[1].decode("utf-8", "replace") if found else ""
-        info = self._names.get(name.partition("#")[0].rpartition("/")[2].casefold())
-        if info is None:
-            documents = (i for key, i in self._names.items() if key.endswith(".dae"))
-            info = next(documents, None)
-        if info is None:
+        place = self._like("manifest.xml")
+        manifest = b"" if place is None else b"".join(self._pieces(self._members[place]))
+        found = _MANIFEST.search(manifest)
+        name = found[1].decode("utf-8", "replace").partition("#")[0] if found else ""
+        named = _path("", unquote(name))
+        documents = [path for path in self._members if path.casefold().endswith(".dae")]
+        path = named if named in self._members else self._like(named) or next(iter(documents), None)
+        if path is None:
             raise InputError(self._file, "archive without a .dae document")
-        return list(self._pieces(info))
+        if path != named and (name or len(documents) > 1):
+            said = f"the manifest names {name[:200]!r}" if name else "no manifest names a document"
+            text = f"{said}; of {len(documents)}, {path[:200]} is read"
+            self._report.add(Kind.ASSUMED, "collada-archive", SourceRef(self._file), "", text)
+        self._folder = posixpath.dirname(path)
+        return list(self._pieces(self._members[path]))
+
+    def _like(self, path: str) -> str | None:
+        """The only path that is like this one but for case; else that of the same base name."""
+        for likes, alike in zip(self._likes, (str.casefold, _base), strict=True):
+            found = likes.get(alike(path), [])
+            if found:
+                return found[0] if len(found) == 1 else None
+        return None
 
     def _pieces(self, info: zipfile.ZipInfo) -> Iterator[bytes]:
         try:
@@ -75,6 +105,22 @@ class Archive:
             RuntimeError,  # encrypted; a method that Python has not is its NotImplementedError
         ) as error:
             raise InputError(self._file, f"{info.filename[:80]}: cannot be unpacked") from error
+
+
+def _path(folder: str, name: str) -> str:
+    """A member's path from the top of the archive."""
+    return posixpath.normpath(posixpath.join(folder, name.strip().replace("\\", "/")))
+
+
+def _base(path: str) -> str:
+    return posixpath.basename(path).casefold()
+
+
+def _grouped(paths: Iterable[str], alike: Callable[[str], str]) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    for path in paths:
+        found.setdefault(alike(path), []).append(path)
+    return found
 
 
 def unpack(content: bytes, resolver: Resolver) -> tuple[list[bytes], Archive | None]:

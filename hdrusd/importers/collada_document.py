@@ -41,6 +41,9 @@ class Document:
     generator: str = ""
     unit_m: float = 1.0
     up: str = "Y_UP"
+    unit_stated: bool = False
+    up_stated: bool = False
+    stated: frozenset[str] = frozenset()  # as ``Resolver`` has it
     ids: dict[str, Element] = field(default_factory=dict)
     _commas: bool = False
 
@@ -56,28 +59,32 @@ class Document:
                 self.ids[name] = element
         asset = self.root.child("asset")
         if asset is None:
-            text = "no asset; 1 unit is 1 m, Y is up"
-            self.note(Kind.ASSUMED, "collada-asset", self.root, "", text)
+            taken = {"unit": "1 unit is 1 m", "up": "Y is up"}
+            words = ", ".join(text for key, text in taken.items() if key not in self.stated)
+            if words:
+                self.note(Kind.ASSUMED, "collada-asset", self.root, "", f"no asset; {words}")
             return
         contributor = asset.child("contributor")
         if contributor is not None:
             self.generator = contributor.words("authoring_tool")
         self._read_unit(asset)
+        self.up_stated = bool(asset.words("up_axis"))
         self.up = asset.words("up_axis") or "Y_UP"
         if self.up not in ("X_UP", "Y_UP", "Z_UP"):
             text = f"up_axis {self.up[:40]!r}; want X_UP, Y_UP or Z_UP; Y is up"
             self.note(Kind.INVALID, "collada-asset", asset, "", text)
-            self.up = "Y_UP"
+            self.up, self.up_stated = "Y_UP", False
 
     def _read_unit(self, asset: Element) -> None:
         unit = asset.child("unit")
         if unit is None or not unit.get("meter"):
-            text = "no unit; 1 unit is 1 m, the format's default"
-            self.note(Kind.ASSUMED, "collada-asset", asset, "", text)
+            if "unit" not in self.stated:
+                text = "no unit; 1 unit is 1 m, the format's default"
+                self.note(Kind.ASSUMED, "collada-asset", asset, "", text)
             return
         value = self.numbers(unit, unit.get("meter"))
         if len(value) == 1 and 1e-9 <= value[0] <= 1e9:
-            self.unit_m = float(value[0])
+            self.unit_m, self.unit_stated = float(value[0]), True
             return
         text = f"unit of {unit.get('meter')[:40]!r} m; 1 m is used"
         self.note(Kind.INVALID, "collada-asset", unit, unit.get("name"), text)

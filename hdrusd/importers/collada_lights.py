@@ -38,6 +38,7 @@ _READ = frozenset(
 )
 #: Of radiant power as a lamp's light, lm/W: 683 is that of 555 nm, as glTF exporters agreed.
 LUMENS_A_WATT = 683.0
+_AT = f" at {LUMENS_A_WATT:g} lm/W, if white"
 _BLENDER = re.compile(r"Blender (\d+)\.(\d+)")
 #: The first Blender whose lights are in watts.
 _WATTS_SINCE = 2, 80
@@ -135,11 +136,11 @@ class LightReader:
                 red, green, blue = (c / watts for c in color)
                 if kind == "directional":
                     lux = watts * LUMENS_A_WATT
-                    text = f"Blender says {watts:g} W/m2; {lux:g} lx at {LUMENS_A_WATT:g} lm/W"
+                    text = f"Blender says {watts:g} W/m2; {lux:g} lx{_AT}"
                     document.note(Kind.GUESSED, "collada-light-watts", element, name, text)
                     return (red, green, blue), None, lux
                 candela = watts * LUMENS_A_WATT / (4.0 * math.pi)
-                text = f"Blender says {watts:g} W; {candela:g} cd at {LUMENS_A_WATT:g} lm/W"
+                text = f"Blender says {watts:g} W; {candela:g} cd{_AT}"
                 document.note(Kind.GUESSED, "collada-light-watts", element, name, text)
                 return (red, green, blue), candela, None
         holder = place.child("intensity") or stated.get("intensity") or stated.get("multiplier")

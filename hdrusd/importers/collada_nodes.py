@@ -294,7 +294,7 @@ class NodeReader:
         numbers: Sequence[int] = prototype.sets
         keys = {n: "st" if k == 0 else f"st{k}" for k, n in enumerate(numbers)}
         bound = {} if item is None else _vertex_inputs(item)
-        for channel in set(self.materials.read(element).channels.values()):
+        for channel in dict.fromkeys(self.materials.read(element).channels.values()):
             if not numbers:
                 text = f"{named(element, '')} has a texture, the mesh no coordinates"
                 self.document.note(Kind.MISSING, "mesh-uv-set", instance, thing, text)

@@ -134,13 +134,14 @@ class TextureReader:
     def _file(self, reference: str, element: Element, thing: str) -> Image:
         place = self.document.ref(element)
         plain = file_name(reference)
+        names = list(dict.fromkeys([unquote(plain), plain]))
         if self.archive is not None:
-            packed = self.archive.member(unquote(plain))
+            packed = self.archive.picture(names, place, thing)
             if packed is not None:
                 return Image(reference[:LONGEST], place, data=packed)
         path: Path | None = None
         try:
-            path = locate(list(dict.fromkeys([unquote(plain), plain])), self.resolver, place, thing)
+            path = locate(names, self.resolver, place, thing)
         except (OSError, ValueError):  # a name that no file system has
             text = f"{reference[:200]!r}: not a file name"
             self.document.note(Kind.MISSING, "file-missing", element, thing, text)

@@ -35,6 +35,8 @@ class Document:
     scene: Held
     up: Literal["Y", "Z"] = "Y"
     unit_m: float = 0.01
+    up_stated: bool = True
+    unit_stated: bool = True
 
     @property
     def limits(self) -> Limits:
@@ -144,8 +146,10 @@ def _up(document: Document) -> tuple[Literal["Y", "Z"], bool]:
     axes = document.scene.settings.axes
     right, up, front = (int(axis) for axis in axes)
     if _NO_AXIS in (right, up, front):
-        text = "no axis system in the file; +Y is up, as exporters of that age turned it"
-        document.note(Kind.ASSUMED, "fbx-axes", document.ref(), "", text)
+        document.up_stated = False
+        if "up" not in document.resolver.stated:
+            text = "no axis system in the file; +Y is up, as exporters of that age turned it"
+            document.note(Kind.ASSUMED, "fbx-axes", document.ref(), "", text)
         return "Y", False
     (a, b, c), (d, e, f) = _AXES[right], _AXES[up]
     right_handed = (b * f - c * e, c * d - a * f, a * e - b * d) == _AXES[front]
@@ -159,13 +163,15 @@ def _up(document: Document) -> tuple[Literal["Y", "Z"], bool]:
 
 def _unit(document: Document) -> float:
     settings = document.scene.settings
-    if settings.props.find_prop("UnitScaleFactor") is None:
+    document.unit_stated = settings.props.find_prop("UnitScaleFactor") is not None
+    if not document.unit_stated and "unit" not in document.resolver.stated:
         text = "no unit in the file; 1 unit is 1 cm, FBX's own"
         document.note(Kind.ASSUMED, "fbx-unit", document.ref(), "", text)
     unit = float(settings.unit_meters)
     if not 1e-9 <= unit <= 1e9:
         text = f"a unit of {unit:g} m; 1 cm is used"
         document.note(Kind.INVALID, "fbx-unit", document.ref(), "", text)
+        document.unit_stated = False
         return 0.01
     return unit
 

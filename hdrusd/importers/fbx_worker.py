@@ -45,6 +45,8 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
         skins=nodes.skins,
         up=document.up,
         unit_m=document.unit_m,
+        unit_stated=document.unit_stated,
+        up_stated=document.up_stated,
         ambient=_ambient(document),
         generator=document.application(),
     )

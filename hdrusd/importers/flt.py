@@ -10,7 +10,7 @@ Source: OpenFlight Scene Description Database Specification 16.5 (Presagis, 2016
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from hdrusd.errors import InputError, SourceRef
@@ -21,6 +21,7 @@ from hdrusd.importers.flt_records import Document, load
 from hdrusd.importers.flt_textures import TextureReader
 from hdrusd.importers.flt_tree import Reference, Tree, TreeReader
 from hdrusd.importers.importer import Resolver, resolver_of
+from hdrusd.legacy.merge import rescaled
 from hdrusd.legacy.scene import LegacyScene
 from hdrusd.report import Kind, Report
 
@@ -29,8 +30,9 @@ from hdrusd.report import Kind, Report
 _OWN = 0xFFFFFFFF
 _FLAGS_UNSET = 1541
 
-#: A file and the palettes that it inherits: what it inherits from, and by which flags.
-_Key = tuple[Path, int, int]
+#: A file, the palettes that it inherits, what it inherits from and by which flags, and the unit
+#: that it is scaled to.
+_Key = tuple[Path, int, int, float]
 
 
 def read(resolver: Resolver, report: Report) -> LegacyScene:
@@ -69,7 +71,7 @@ class _SceneReader:
     def read(self) -> LegacyScene:
         """The whole scene. Raises InputError past the limits."""
         document = load(self.resolver, self.report)
-        self.scene.unit_m = document.unit_m
+        self.scene.unit_m, self.scene.unit_stated = document.unit_m, document.unit_stated
         self.scene.generator = f"OpenFlight {document.version / 100:.2f}"
         tree = self._tree(document, read_palettes(document))
         self.scene.roots.append(tree.root)
@@ -79,8 +81,12 @@ class _SceneReader:
         return self.scene
 
     def _tree(self, document: Document, palettes: Palettes) -> Tree:
+        lights = self.scene.lights
+        first, factor = len(lights), document.unit_m / self.scene.unit_m
         reader = TreeReader(document, palettes, self.scene, self.materials, self._count)
         tree = reader.read()
+        if factor != 1.0:
+            lights[first:] = [rescaled(light, factor) for light in lights[first:]]
         self._count = reader.count
         self.waiting += [_Waiting(document, palettes, found) for found in tree.references]
         total = sum(len(mesh.points) for mesh in self.scene.meshes)
@@ -122,12 +128,15 @@ class _SceneReader:
         """The tree of a file under inherited palettes; None, with a finding, if it is broken."""
         document = waiting.document
         own = flags | 0x00FFFFFF == _OWN
-        key = path, 0 if own else id(waiting.palettes), 0 if own else flags
+        inherited = (0, 0) if own else (id(waiting.palettes), flags)
+        key = path, *inherited, document.unit_m
         if key in self._trees:
             return self._trees[key]
         self._trees[key] = None
         try:
-            inner = load(resolver_of(path, document.resolver), self.report)
+            # What is stated is the unit of the source, which its parts are scaled to.
+            resolver = replace(resolver_of(path, document.resolver), stated=frozenset())
+            inner = load(resolver, self.report)
         except InputError as error:
             record, node = waiting.reference.record, waiting.reference.node
             document.add(Kind.INVALID, "flt-external", record, node.name, f"{error}; left out")

@@ -124,6 +124,7 @@ class Document:
     records: Records
     version: int
     unit_m: float
+    unit_stated: bool = True
 
     def ref(self, record: int) -> SourceRef:
         """Where a record stands."""
@@ -200,7 +201,7 @@ def load(resolver: Resolver, report: Report) -> Document:
         text = f"OpenFlight revision {version}; read as 16"
         report.add(Kind.ASSUMED, "flt-version", SourceRef(source, "byte 12"), "", text)
     unit = data[62]
-    if unit not in _UNITS:
+    if unit not in _UNITS and "unit" not in resolver.stated:
         text = f"vertex coordinate unit {unit}; want 0, 1, 4, 5 or 8; metres are used"
         report.add(Kind.ASSUMED, "flt-unit", SourceRef(source, "byte 62"), "", text)
     places = walk(data, source)
@@ -209,7 +210,9 @@ def load(resolver: Resolver, report: Report) -> Document:
     records = _indexed(buffer, places, source, report, resolver.limits)
     unit_m = _UNITS.get(unit, 1.0)
     return Document(
-        source, report, resolver.limits, resolver, data, buffer, records, version, unit_m
+        *(source, report, resolver.limits, resolver, data, buffer, records, version),
+        unit_m=unit_m,
+        unit_stated=unit in _UNITS,
     )
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from hdrusd.errors import SourceRef
 from hdrusd.importers.flt_palettes import PaletteTexture
-from hdrusd.legacy.scene import Image, Texture, Wrap
+from hdrusd.legacy.scene import Image, Texture, Wrap, environment_note
 from hdrusd.report import Kind, Report
 
 _WRAPS: dict[int, Wrap] = {0: "repeat", 1: "clamp", 3: "mirror"}
@@ -82,7 +82,7 @@ class TextureReader:
             self.report.add(Kind.INVALID, "flt-attributes", source, entry.name, text)
             mode = 0
         if mode != 0:
-            text = f"texture environment {_MODES[mode]}; kept as a note, shown as MODULATE"
+            text = environment_note(_MODES[mode])
             self.report.add(Kind.REPLACED, "flt-texture-mode", source, entry.name, text)
         if as_alpha:
             text = "intensity as alpha; the picture is used as it is"

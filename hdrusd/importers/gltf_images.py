@@ -19,6 +19,9 @@ from hdrusd.legacy.scene import Image, Texture, UVTransform, Wrap
 from hdrusd.report import Kind
 
 _WRAPS: dict[int, Wrap] = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
+_PATH = "/\\:"
+_LONG = 64  # characters of an image's name
+_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tga", ".bmp", ".tif", ".tiff", ".dds", ".exr")
 _NEAREST = (9728, 9984, 9986)  # NEAREST, NEAREST_MIPMAP_NEAREST, NEAREST_MIPMAP_LINEAR
 
 
@@ -30,6 +33,7 @@ class Textures:
         self._accessors = accessors
         self._resolver = resolver
         self._images: dict[int, Image] = {}
+        self._names: set[str] = set()
         self._views: dict[int, bytes] = {}
         self._view_bytes = 0
 
@@ -84,6 +88,7 @@ class Textures:
         uri = item.text("uri")
         if uri and not uri.startswith("data:"):
             reference = unquote(uri)
+            self._names.add(reference)
             path = self._resolver.find(reference, item.ref, thing=item.name)
             if path is not None and path.suffix.lower() in (".ktx2", ".ktx"):
                 item.note(
@@ -101,7 +106,19 @@ class Textures:
         except InputError as error:
             code, data = "image-data", None
             self._document.keep_going(error, code, item.name, "the image is missing")
-        return Image(f"image_{index}{suffix}", item.ref, data=data)
+        return Image(self._name(index, item, suffix), item.ref, data=data)
+
+    def _name(self, index: int, item: Item, suffix: str) -> str:
+        """That of an embedded image, by which it is told: no path, short, of no other image."""
+        said = "".join(c if c.isprintable() and c not in _PATH else "_" for c in item.name[:_LONG])
+        said = said.strip(" .")
+        stem, _, last = said.rpartition(".")
+        stem = stem if stem and f".{last.lower()}" in _SUFFIXES else said
+        stem = stem or f"image_{index}"
+        while stem + suffix in self._names:
+            stem = f"{stem}_{index}"
+        self._names.add(stem + suffix)
+        return stem + suffix
 
     def _embedded(self, item: Item) -> bytes:
         index = item.index("bufferView", "bufferViews")

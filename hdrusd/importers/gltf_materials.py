@@ -78,7 +78,13 @@ def _material(item: Item, name: str, textures: Textures) -> Material:
     emission = _emission(item)
     if emission is None:
         surface.defaults.add("emission")
-    over = _relief(item, textures) | clearcoat(item, textures, surface.pbr)
+    lit = item.extension("KHR_materials_unlit") is None
+    over = _relief(item, textures)
+    if lit:
+        over |= clearcoat(item, textures, surface.pbr)
+    else:  # it knows no highlight, so exporters leave out factors whose default is metal
+        dull = {"metallic": 0.0, "roughness": 1.0}
+        surface = replace(surface, specular=(0.0, 0.0, 0.0), pbr=dull, maps={})
     maps: dict[str, Any] = surface.maps | over
     dropped = sorted(set(item.child("extensions").data) - _READ_EXTENSIONS)
     if dropped:
@@ -98,7 +104,7 @@ def _material(item: Item, name: str, textures: Textures) -> Material:
         alpha_mode=mode,
         alpha_cutoff=item.number("alphaCutoff", 0.5, low=0.0),
         two_sided=item.flag("doubleSided"),
-        lit=item.extension("KHR_materials_unlit") is None,
+        lit=lit,
         emission_cd_m2=True,
         pbr=surface.pbr,
         defaults=frozenset(surface.defaults),

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Protocol
 
@@ -32,6 +33,30 @@ class Limits:
     worker_seconds: int = 120  # its wall time, and its processor time
 
 
+class _Folders:
+    """What lies in the folders that are looked into, each listed once."""
+
+    def __init__(self) -> None:
+        self._names: dict[tuple[int, int], dict[str, str]] = {}  # by device and inode
+
+    def existing(self, path: Path) -> Path | None:
+        """``path`` as it stands, else the like of it in another case; None if neither is there."""
+        try:
+            if path.exists():
+                return path.resolve()
+            about = path.parent.stat()
+            if not stat.S_ISDIR(about.st_mode):
+                return None
+            folder = about.st_dev, about.st_ino
+            if folder not in self._names:
+                entries = sorted(path.parent.iterdir(), reverse=True)  # the first stays
+                self._names[folder] = {entry.name.casefold(): entry.name for entry in entries}
+            name = self._names[folder].get(path.name.casefold())
+            return None if name is None else (path.parent / name).resolve()
+        except (OSError, ValueError, RuntimeError):  # a name too long or unspeakable, link loops
+            return None
+
+
 @dataclass(slots=True)
 class Resolver:
     """Opens files for a reader, and only below the declared roots.
@@ -47,6 +72,8 @@ class Resolver:
     search: Sequence[Path] = ()
     limits: Limits = field(default_factory=Limits)
     found: set[Path] = field(default_factory=set)  # what ``find`` has answered, by real paths
+    stated: frozenset[str] = frozenset()  # "unit", "up": what a person states of the source
+    _folders: _Folders = field(default_factory=_Folders)
 
     def __post_init__(self) -> None:
         base = self.source.resolve().parent
@@ -108,9 +135,13 @@ class Resolver:
         ]
         candidates = [base / name, *(folder / tail for folder in folders)]
         refused: Path | None = None
+        other: Path | None = None  # what is there and no file
         for tried, candidate in enumerate(candidates):
-            found = _existing(candidate)
+            found = self._folders.existing(candidate)
             if found is None:
+                continue
+            if found.is_dir() or (self._below(found) and not found.is_file()):
+                other = other or found
                 continue
             if not self.allowed(found):
                 refused = refused or found
@@ -126,6 +157,8 @@ class Resolver:
             self.found.add(found)
             return found
         why = "not found; add --search-path"
+        if other:
+            why = f"{'a folder' if other.is_dir() else 'not a regular file'}; want a file"
         if refused:
             why = "outside the declared roots"
             ancestor = Path(os.path.commonpath([base, refused.parent]))
@@ -138,27 +171,15 @@ class Resolver:
     def allowed(self, path: Path) -> bool:
         """Whether a regular file lies, links followed, below one of the roots."""
         real = path.resolve()
-        return real.is_file() and any(real.is_relative_to(root) for root in self.roots)
+        return real.is_file() and self._below(real)
 
-
-def _existing(path: Path) -> Path | None:
-    """``path`` as it stands, else the like of it in another case; None if neither is there."""
-    try:
-        if path.exists():
-            return path.resolve()
-        if path.parent.is_dir():
-            wanted = path.name.casefold()
-            for entry in sorted(path.parent.iterdir()):
-                if entry.name.casefold() == wanted:
-                    return entry.resolve()
-    except (OSError, ValueError, RuntimeError):  # a name too long or unspeakable, a loop of links
-        return None
-    return None
+    def _below(self, real: Path) -> bool:
+        return any(real.is_relative_to(root) for root in self.roots)
 
 
 def resolver_of(path: Path, above: Resolver) -> Resolver:
     """For what an external file names: relative to itself, below the same roots."""
-    return Resolver(path, above.report, above.roots, above.search, above.limits, above.found)
+    return replace(above, source=path)
 
 
 class Importer(Protocol):

@@ -132,7 +132,7 @@ class _Builder:
         if opacity_map is not None:
             opacity_map = self._with_channel(opacity_map)
         alpha = self._alpha()
-        diffuse = self._color("kd", "diffuse", record.diffuse)
+        diffuse = self._diffuse(record.diffuse, diffuse_map)
         specular, lit = self._illumination(self._color("ks", "specular", record.specular))
         emission = self._emission(record.emission, emission_map)
         for key, factor, used in (("kd", diffuse, diffuse_map), ("ke", emission, emission_map)):
@@ -261,6 +261,24 @@ class _Builder:
                 self._broken(statement, "an exponent of 0 or more", default)
         self.defaults.add("shininess")
         return default
+
+    def _diffuse(self, default: RGB, diffuse_map: Texture | None) -> RGB:
+        """Kd; not said, 1 beside a picture, and else OpenGL's default: the manual has none.
+
+        Blender writes no Kd where there is a picture, and reads it as it is; so does three.js.
+        Assimp and tinyobjloader dim it to 0.6.
+        """
+        diffuse = self._color("kd", "diffuse", default)
+        said = self.entry.statements
+        if "kd" in said:
+            return diffuse
+        if diffuse_map is None or diffuse_map.image.missing:
+            text = f"no Kd; {list(default)} is used"
+            self._note(Kind.ASSUMED, "mtl-diffuse-default", text)
+            return diffuse
+        text = "map_Kd without Kd: the picture is the reflectance by itself (Kd 1 1 1)"
+        self._note(Kind.ASSUMED, "mtl-diffuse-factor", text, said["map_kd"])
+        return 1.0, 1.0, 1.0
 
     def _emission(self, default: RGB, emission_map: Texture | None) -> RGB:
         emission = self._color("ke", "emission", default)

@@ -15,6 +15,7 @@ import numpy as np
 from hdrusd.errors import SourceRef
 from hdrusd.importers import mtl
 from hdrusd.importers.importer import Resolver
+from hdrusd.importers.left_open import leave_open
 from hdrusd.importers.mtl_textures import LONGEST, locate
 from hdrusd.importers.obj_meshes import mesh_of, recentre, usable_faces
 from hdrusd.importers.obj_statements import Statements, parse
@@ -60,9 +61,9 @@ def read(resolver: Resolver, report: Report) -> LegacyScene:
     source = resolver.source
     tally = Tally()
     file = parse(resolver, tally)
-    text = "OBJ states no unit and no up axis: 1 unit = 1 m, Y up (--source-unit, --up Z)"
-    report.add(Kind.ASSUMED, "obj-units", SourceRef(source), "", text)
     scene = LegacyScene(source, "obj", generator=file.generator)
+    taken = {"unit": "1 unit = 1 m", "up": "Y up"}
+    leave_open(scene, resolver, report, "obj-units", "OBJ", **taken)
     scene.materials = _libraries(file, resolver, report)
     materials = _worn(file, scene.materials, source, report)
     faces = usable_faces(file, materials, tally)

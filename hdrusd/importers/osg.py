@@ -18,6 +18,7 @@ from typing import Any
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.importers.expansion import check_expansion
 from hdrusd.importers.importer import Resolver
+from hdrusd.importers.left_open import leave_open
 from hdrusd.importers.osg_files import File, Files, load
 from hdrusd.importers.osg_lights import LightSwitches
 from hdrusd.importers.osg_materials import Look, MaterialReader
@@ -55,6 +56,8 @@ class _SceneReader:
         self.scene = LegacyScene(
             resolver.source, "osg", up="Z", unit_m=1.0, generator=document.generator
         )
+        taken = {"unit": "1 unit = 1 m", "up": "Z up"}
+        leave_open(self.scene, resolver, report, "osg-axes", "OpenSceneGraph", **taken)
         self.report = report
         self.materials = MaterialReader(self.scene.materials)
         self.switches = LightSwitches(self.scene.lights)
@@ -73,8 +76,6 @@ class _SceneReader:
     def read(self) -> LegacyScene:
         """The whole scene. Raises InputError past the limits or where no node is known."""
         source = SourceRef(self.scene.source)
-        text = "the format states no unit and no up axis; 1 unit is 1 m, Z is up"
-        self.report.add(Kind.ASSUMED, "osg-axes", source, "", text)
         root = RenderState()
         above = self.file, ()
         self.stack = [

@@ -15,7 +15,7 @@ src/osgPlugins/obj/ReaderWriterOBJ.cpp (noRotation).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +31,7 @@ from hdrusd.importers.osg_nodes import External, NodeReader
 from hdrusd.importers.osg_state import StateReader
 from hdrusd.importers.osg_text import Document, Statement, parse
 from hdrusd.importers.osg_textures import TextureReader
-from hdrusd.legacy.merge import merge
+from hdrusd.legacy.merge import merge, rescaled
 from hdrusd.legacy.scene import Image, LegacyScene, Node
 from hdrusd.report import Kind, Report
 
@@ -139,6 +139,9 @@ class Files:
 
     def _foreign(self, resolver: Resolver) -> Node:
         """The node that holds what another reader makes of a file. Raises InputError."""
+        # What its format leaves open OpenSceneGraph decides, as is said below.
+        open_to = {"up"} if resolver.source.suffix.lower() == ".flt" else {"unit", "up"}
+        resolver = replace(resolver, stated=frozenset(open_to))
         part = importer.read_part(resolver, self.report)
         self.count(sum(len(mesh.points) for mesh in part.meshes))
         path = resolver.source
@@ -150,6 +153,7 @@ class Files:
             if part.unit_m != 1.0:
                 turn = np.eye(4) if holder.transform is None else np.asarray(holder.transform)
                 holder.transform = turn @ np.diag((*(part.unit_m,) * 3, 1.0))
+                part.lights = [rescaled(light, part.unit_m) for light in part.lights]
                 said[-1] = f"units of {part.unit_m:g} m are scaled to metres"
         else:
             stated = "" if part.unit_m == 1.0 else f", though it states {part.unit_m:g} m"

@@ -29,7 +29,7 @@ from hdrusd.importers.osg_state import RenderState, Setting
 from hdrusd.importers.osg_text import Document, Statement, listed, triple
 from hdrusd.importers.osg_texture_maps import further_map
 from hdrusd.importers.osg_textures import TextureReader
-from hdrusd.legacy.scene import GREEN_UP, RGB, Material, Texture, normal_texels
+from hdrusd.legacy.scene import GREEN_UP, RGB, Material, Texture, environment_note, normal_texels
 from hdrusd.report import Kind
 
 #: Our field: names in .osgt and .osg, and the value of osg::Material's constructor.
@@ -98,8 +98,7 @@ class MaterialReader:
         if units:
             diffuse_map, left_out, has_alpha = self._texture(state, units[0])
         if diffuse_map is not None and diffuse_map.mode != "MODULATE":
-            text = f"texture environment {diffuse_map.mode}; kept as a note, shown as MODULATE"
-            texture = state.settings[units[0], "Texture"]
+            texture, text = state.settings[units[0], "Texture"], environment_note(diffuse_map.mode)
             texture.add(Kind.REPLACED, "osg-texture-mode", diffuse_map.image.name, text)
         opacity_map = None
         if alpha_mode != "opaque" and diffuse_map and has_alpha:

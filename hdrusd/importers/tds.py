@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.importers.importer import Resolver
+from hdrusd.importers.left_open import leave_open
 from hdrusd.importers.tds_cameras import RawCamera, camera, read_camera
 from hdrusd.importers.tds_chunks import Chunk, Document
 from hdrusd.importers.tds_keyframer import (
@@ -79,6 +80,7 @@ class _SceneReader:
 
     def __init__(self, document: Document, resolver: Resolver) -> None:
         self.document = document
+        self.resolver = resolver
         self.scene = LegacyScene(resolver.source, "3ds", up="Z")
         self.materials = MaterialReader(document, MapReader(document, resolver))
         self.meshes = MeshReader(document)
@@ -158,8 +160,8 @@ class _SceneReader:
             document.report.add(Kind.INVALID, "3ds-master-scale", source, "", text)
             self.scale = 1.0
         self.scene.unit_m = self.scale
-        text = f"3DS states no unit: 1 unit = {self.scale:g} m by its master scale, Z up"
-        document.report.add(Kind.ASSUMED, "3ds-units", source, "", f"{text} (--source-unit, --up)")
+        taken = {"unit": f"1 unit = {self.scale:g} m by its master scale", "up": "Z up"}
+        leave_open(self.scene, self.resolver, document.report, "3ds-units", "3DS", **taken)
 
     def _size(self) -> float:
         """The diagonal of all that stands in the mesh editor, source units."""

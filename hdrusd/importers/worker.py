@@ -155,6 +155,7 @@ def read(function: str, resolver: Resolver, report: Report) -> LegacyScene:
             "source": str(resolver.source.absolute()),
             "roots": [str(path) for path in resolver.roots],
             "limits": asdict(resolver.limits),
+            "stated": sorted(resolver.stated),
         }
         (folder / _TASK).write_text(json.dumps(task), encoding="utf-8")
         run_module(
@@ -178,7 +179,8 @@ def _serve(folder: Path) -> NoReturn:
     report = Report()
     limits = Limits(**task["limits"])
     roots = [Path(path) for path in task["roots"]]
-    resolver = Resolver(Path(task["source"]), report, roots, limits=limits)
+    stated = frozenset(task["stated"])
+    resolver = Resolver(Path(task["source"]), report, roots, limits=limits, stated=stated)
     module, _, name = task["function"].partition(":")
     code = 0
     try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hdrusd.legacy.scene import LegacyScene, Mesh, Node, Subset
+from hdrusd.legacy.scene import LegacyScene, Light, Mesh, Node, Subset
 
 
 def merge(scene: LegacyScene, part: LegacyScene) -> list[Node]:
@@ -35,6 +35,18 @@ def merge(scene: LegacyScene, part: LegacyScene) -> list[Node]:
         node.skin = None if node.skin is None else skins + node.skin
         stack += node.children
     return part.roots
+
+
+def rescaled(light: Light, factor: float) -> Light:
+    """A light of a part whose unit is ``factor`` units of the whole, which its node scales by.
+
+    OpenGL's attenuation is in no node's space, but by distances of the scene. The place and the
+    size of a lamp are in its node's, and stay.
+    """
+    if light.attenuation is None:
+        return light
+    k0, k1, k2 = light.attenuation
+    return replace(light, attenuation=(k0, k1 / factor, k2 / factor**2))
 
 
 def _moved(mesh: Mesh, materials: int) -> Mesh:

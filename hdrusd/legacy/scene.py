@@ -12,7 +12,8 @@ translation is row 3. Texture coordinates have t = 0 at the BOTTOM of the image
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
@@ -50,6 +51,19 @@ class Image:
     def missing(self) -> bool:
         """True when there is nothing to show; the finding was made by the reader."""
         return self.path is None and self.data is None and self.pixels is None
+
+    def key(self) -> Hashable:
+        """Equal of two records of one picture: its file, else what it holds; of a missing one its
+        name and where that is looked for.
+        """
+        if self.path is not None:
+            return self.path
+        if self.data is not None:
+            return self.data
+        if self.pixels is not None:
+            held = hashlib.sha256(self.pixels.tobytes())
+            return self.pixels.shape, held.digest()
+        return self.name, self.source.file.parent
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +145,17 @@ DATA_MAPS = (
     *("metallic_map", "roughness_map", "clearcoat_map", "clearcoat_roughness_map"),
     *("occlusion_map", "normal_map"),
 )
+
+
+#: TexEnv modes in which the texture stands in the place of the material's colour.
+COVERING = ("REPLACE", "DECAL")
+
+
+def environment_note(mode: str) -> str:
+    """What becomes of a TexEnv mode other than MODULATE, for a finding."""
+    if mode in COVERING:
+        return f"texture environment {mode}: in place of the material's colour; shown with D = 1"
+    return f"texture environment {mode}; kept as a note, shown as MODULATE"
 
 
 #: Of formats that do not say which way green points; half of all programs turn it over.
@@ -320,13 +345,15 @@ class LegacyScene:
     skins: list[Skin] = field(default_factory=list)
     up: Literal["Y", "Z"] = "Y"
     unit_m: float = 1.0  # metres per source unit, as the format states or assumes
+    unit_stated: bool = True  # by the file or its format; False: ``unit_m`` is only taken
+    up_stated: bool = True
     ambient: RGB | None = None  # light model ambient, dimensionless, where the file sets it
     generator: str = ""
 
     def counts(self) -> dict[str, int]:
         """How many of each there are: for reports and ``hdrusd info``."""
         images = {
-            texture.image.name
+            texture.image.key()
             for material in self.materials
             for texture in material.maps().values()
         }

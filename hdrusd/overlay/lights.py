@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,11 +16,14 @@ from hdrusd.legacy import scene as legacy
 from hdrusd.luminaires import LuminaireFiles
 from hdrusd.photometry.interpret import Interpreter, LuminaireFile, rule_color
 from hdrusd.photometry.light import PhotometricLight
-from hdrusd.photometry.light_unit import CONSTANTS, LIGHT_UNITS
+from hdrusd.photometry.light_unit import CONSTANTS, LIGHT_UNITS, LightUnit
 from hdrusd.photometry.sidecar import Rule, Sidecar
+from hdrusd.photometry.spread import OWN, Beam, Emitter, beam_solid_angle
+from hdrusd.photometry.strength import STRENGTHS, Stated, note_wrong_unit, stated_candela
 from hdrusd.report import Kind, Report
 from hdrusd.skies import SkyFiles, even_sky
 from hdrusd.usd import ambient, light, light_overs
+from hdrusd.usd.findings import first_place
 from hdrusd.usd.light_overs import (
     NO_SHAPING,
     SourceLight,
@@ -29,21 +31,22 @@ from hdrusd.usd.light_overs import (
     shaping,
     write_light_over,
 )
-from hdrusd.usd.lux import input_source, normalized, photometric_file
+from hdrusd.usd.lux import (
+    input_source,
+    light_kind,
+    normalized,
+    photometric_file,
+    strength_per_nit,
+)
 from hdrusd.usd.names import unique
 from hdrusd.usd.overs import Overs
-from hdrusd.usd.placed import level_share
+from hdrusd.usd.placed import is_shown, level_share
 from hdrusd.usd.preset_sky import write_sky_dome, write_sky_sun
 from hdrusd.usd.source_stage import source_layer
+from hdrusd.usd.transform import uniform_scale
 
-#: Lumens of a lamp by its candela on the axis: 4 pi of a ball, pi of a matt face, pi^2 of a tube.
-_FLUX = {"sphere": 4.0 * math.pi, "disk": math.pi, "rect": math.pi, "cylinder": math.pi**2}
-
-#: Lights whose shape alone sends more forward than aside.
-_FACES = ("disk", "rect", "cylinder")
-
-#: Keys of a light's rule that state all its light.
-_FLUXES = frozenset({"lumens", "watts", "radiant_watts"})
+#: Lights that shine by their shape, each way as much as is seen of it.
+_EMITTERS: dict[str, Emitter] = {"disk": "face", "rect": "face", "cylinder": "tube"}
 
 #: Keys of a light's rule that turn or free a lamp, which a stage says itself.
 _UNUSED = ("axis", "c0", "fixture_shadow")
@@ -74,6 +77,8 @@ class LightOverlay:
         self.file = Path(source_layer(self.stage).realPath)
         self.sky = sidecar.ambient if not ambient.has_ambient(self.stage) else None
         self.rows: list[dict[str, Any]] = []
+        self.selected = True  # whether the stage is in the states that are shown
+        self._standing: list[tuple[dict[str, Any], list[tuple[Sdf.Path, int]]]] = []
         self._done: set[str] = set()
         self._photometric = 0
 
@@ -84,16 +89,23 @@ class LightOverlay:
             return
         self._done.add(place)
         names = [prim.GetName(), prim.GetDisplayName(), prim.GetParent().GetName()]
-        rule = self.sidecar.match("light", *names, *(str(p.GetPath()) for p in places[:1]))
+        rule = self.sidecar.match("light", *names, str(first_place(prim)))
         if light_overs.is_photometric(prim):
             self._photometric += 1
-            made = light.read_light(prim)
-            row = light_row(prim.GetName(), str(prim.GetPath()), made, level=_level(made, places))
-            self.rows.append(row | {"lamps": sum(map(light_overs.copies, places))})
+            world = UsdGeom.Xformable(places[0]).ComputeLocalToWorldTransform(_EARLIEST)
+            metres = uniform_scale(world)[0] * UsdGeom.GetStageMetersPerUnit(self.stage)
+            time = _brightest(prim)
+            made = light.read_light(prim, time, scale=metres)
+            path = str(first_place(prim))
+            row = light_row(prim.GetName(), path, made, level=_level(made, places))
+            row |= _of_shape(prim, made, strength_per_nit(prim, time, False, world)[0])
+            self._add(row, places)
             return
         source = read_source_light(prim, places)
         if source is None or not source.sound:
-            text = "no closed form" if source is None else "a strength that is no number"
+            text = (
+                "no closed form" if source is None else "a strength that is negative or no number"
+            )
             self._note(prim, Kind.REPLACED, "usd-light-kept", f"{text}; kept as it is")
             return
         if source.kind == "dome" and self.sky is not None:
@@ -117,6 +129,19 @@ class LightOverlay:
             self._note(prim, Kind.REPLACED, "usd-light-resampled", text)
         write_light_over(self.overs, source, meaning, radius=radius)
         self._account(source, meaning, file, places)
+
+    def _add(self, row: dict[str, Any], places: Sequence[Usd.Prim]) -> None:
+        """A row of the account, and where its lamps stand: nowhere in states not selected."""
+        stands = [(prim.GetPath(), light_overs.copies(prim)) for prim in places]
+        row["lamps"] = sum(count for _, count in stands)
+        self.rows.append(row)
+        self._standing.append((row, stands if self.selected else []))
+
+    def count_shown(self) -> None:
+        """How many lamps of each row the stage shows, now that it is composed with the overs."""
+        find = self.stage.GetPrimAtPath
+        for row, stands in self._standing:
+            row["lamps_shown"] = sum(count for path, count in stands if is_shown(find(path)))
 
     def write_sky(self) -> None:
         """The sky of the photometry file, where it states one and the stage has not."""
@@ -177,16 +202,26 @@ class LightOverlay:
             text = f"{unit.name} go with normalize 1; read as nits"
             self._note(prim, Kind.ASSUMED, "usd-light-unit", text)
             return source
-        factor = unit.distant if distant else unit.local
+        factor = self._factor(unit, distant=distant)
         moments = {
             time: replace(m, strength=m.strength * factor) for time, m in source.moments.items()
         }
         return replace(source, moments=moments)
 
+    def _factor(self, unit: LightUnit, *, distant: bool) -> float:
+        """What the cd or lx by the letter are multiplied by.
+
+        The letter divides by an area in the stage's units; watts do not know of these.
+        """
+        if distant:
+            return unit.distant
+        metres = UsdGeom.GetStageMetersPerUnit(self.stage) if unit.name != "nits" else 1.0
+        return unit.local / (metres * metres)
+
     def _luminaire(self, source: SourceLight, rule: Rule | None) -> LuminaireFile | None:
         if rule is None or "ies" not in rule.values or source.kind in ("distant", "dome"):
             return None
-        return self.luminaires.use(str(rule.values["ies"]), rule.place)
+        return self.luminaires.use(rule)
 
     def _meaning(
         self, source: SourceLight, rule: Rule | None, file: LuminaireFile | None
@@ -198,24 +233,58 @@ class LightOverlay:
             return self._letter(PhotometricLight("ambient", top.strength, top.color))
         if rule is None and top.strength == 0.0:
             return self._letter(PhotometricLight("point", 0.0, top.color))
-        if rule is not None and source.kind in ("disk", "rect") and "spread" not in rule.values:
-            rule = replace(rule, values={**rule.values, "spread": "lambert"})
+        own = "" if source.kind in ("distant", "dome") else photometric_file(prim)
+        stated = None
+        lit = rule is not None and rule.values.get("enabled", True)
+        if rule is not None and lit and own and file is None:
+            rule = self._without_strength(prim, rule)
+        if rule is not None and lit and source.kind in _EMITTERS:
+            rule, stated = self._by_shape(source, rule, file)
         made = self.interpreter.light(self._asked(source), rule, file)
         if made is None:
             return None
+        if stated is not None:
+            made = replace(made, provenance=stated.provenance, rule=stated.rule)
+            made = replace(made, source=stated.source)
         if made.rule == "source file":
             self._note_letter(source)
             made = self._letter(made)
-        if source.kind in _FACES and shaping(prim) == NO_SHAPING:
-            # What a rule's spread says of a ball, a face or a tube has by its shape.
-            made = replace(made, kind="point", cutoff=180.0, softness=0.0, exponent=0.0)
-        own = photometric_file(prim)
-        if own and not made.profile and source.kind not in ("distant", "dome"):
-            made = replace(made, profile=own)
-        if source.kind == "cylinder" and rule is not None and _FLUXES & rule.values.keys():
-            # A tube's lumens go out over pi^2 of its candela, and no spread of a rule is that.
-            made = replace(made, intensity=made.intensity * _FLUX["sphere"] / _FLUX["cylinder"])
-        return made
+        return replace(made, profile=own) if own and not made.profile else made
+
+    def _without_strength(self, prim: Usd.Prim, rule: Rule) -> Rule:
+        """A rule for a light that is a factor on the unread candela of a photometric file."""
+        said = [key for key in STRENGTHS if key in rule.values]
+        if said:
+            text = f"{rule.place} says {' and '.join(said)}, which would multiply "
+            text += f"{photometric_file(prim)} of the stage; not used; want ies beside it"
+            self._note(prim, Kind.INVALID, "sidecar-unit", text)
+        return _without(rule, said)
+
+    def _by_shape(
+        self, source: SourceLight, rule: Rule, file: LuminaireFile | None
+    ) -> tuple[Rule, Stated | None]:
+        """The rule of a face or a tube with its strength in candela: its shape spreads its light.
+
+        With how they came about, where the rule states a strength and no ``file`` does.
+        """
+        emitter = _EMITTERS[source.kind]
+        said = rule.values.get("spread")
+        if file is None and said not in (None, "cone", OWN[emitter]):
+            text = f"a {source.prim.GetTypeName()} shines by its shape: not by spread {said}"
+            self._note(source.prim, Kind.REPLACED, "light-spread", text)
+        if said not in ("cone", OWN[emitter]):
+            rule = _without(rule, ["spread"])
+
+        def note(kind: Kind, code: str, text: str) -> None:
+            self._note(source.prim, kind, code, text)
+
+        beam = Beam(*shaping(source.prim), emitter)
+        stated = stated_candela(rule, beam, note) if file is None else None
+        rule = _without(rule, ["spread"])
+        if stated is not None:
+            values = {**_without(rule, STRENGTHS).values, "candela": stated.value}
+            rule = replace(rule, values=values)
+        return rule, stated
 
     def _letter(self, made: PhotometricLight) -> PhotometricLight:
         return replace(made, provenance="authored", rule=self.unit.text, source="")
@@ -228,7 +297,7 @@ class LightOverlay:
         cutoff, softness, exponent = shaping(prim) if local else NO_SHAPING
         return legacy.Light(
             name=prim.GetName(),
-            source=SourceRef(self.file, str(prim.GetPath())),
+            source=SourceRef(self.file, str(first_place(prim))),
             kind=kinds.get(source.kind, "point"),  # type: ignore[arg-type]
             diffuse=top.color,
             specular=top.color,
@@ -249,6 +318,11 @@ class LightOverlay:
     def _plain_dome(self, prim: Usd.Prim, rule: Rule) -> bool:
         """Whether a rule's illuminance can be a dome's: not of one with a picture."""
         if "illuminance" not in rule.values:
+
+            def note(kind: Kind, code: str, text: str) -> None:
+                self._note(prim, kind, code, text)
+
+            note_wrong_unit(rule, "illuminance", STRENGTHS, note)
             return "enabled" in rule.values
         if light_overs.pictured(prim):
             text = f"{rule.place}: a dome with a picture takes no illuminance"
@@ -275,7 +349,7 @@ class LightOverlay:
         writer = str(specs[0].layer.documentation) if specs else ""
         if writer.startswith("Blender") and (source.kind == "dome" or normalized(prim, _EARLIEST)):
             right = LIGHT_UNITS["blender-watts"]
-            factor = right.distant if source.kind == "distant" else right.local
+            factor = self._factor(right, distant=source.kind == "distant")
             text = (
                 f"{writer} writes watts; {strength * factor:.4g} {unit} with "
                 '[usd] light_unit = "blender-watts" in the photometry file'
@@ -302,26 +376,45 @@ class LightOverlay:
         flux = None if file is None else made.intensity * file.luminaire.flux()
         row = light_row(
             prim.GetName(),
-            str(places[0].GetPath()),
+            str(first_place(prim)),
             replace(made, radius=source.radius) if source.radius > 0.0 else made,
             self._asked(source),
-            place=str(SourceRef(self.file, str(prim.GetPath()))),
+            place=str(SourceRef(self.file, str(first_place(prim)))),
             node=prim.GetParent().GetName(),
             file_flux=flux,
             level=_level(made, places),
         )
-        row["lamps"] = sum(map(light_overs.copies, places))
-        if source.kind in _FLUX and not made.profile:
-            per_nit = source.brightest.per_nit
-            row["luminance_cd_m2"] = made.intensity / per_nit if per_nit > 0.0 else None
-            if made.kind == "point":
-                row["flux_lm"] = made.intensity * _FLUX[source.kind]
-            elif source.kind != "sphere":
-                row["flux_lm"] = None
-        self.rows.append(row)
+        row |= _of_shape(prim, made, source.brightest.per_nit)
+        self._add(row, places)
 
     def _note(self, prim: Usd.Prim, kind: Kind, code: str, text: str) -> None:
-        self.report.add(kind, code, SourceRef(self.file), str(prim.GetPath()), text)
+        self.report.add(kind, code, SourceRef(self.file), str(first_place(prim)), text)
+
+
+def _of_shape(prim: Usd.Prim, made: PhotometricLight, per_nit: float) -> dict[str, float | None]:
+    """Luminance and flux of a light by its shape. ``per_nit``: cd on the axis that 1 nit makes."""
+    kind = light_kind(prim)
+    if kind in ("distant", "dome", "other") or made.profile:
+        return {}
+    row = {"luminance_cd_m2": made.intensity / per_nit if per_nit > 0.0 else None}
+    if kind in _EMITTERS:
+        beam = Beam(*shaping(prim), _EMITTERS[kind])
+        row["flux_lm"] = made.intensity * beam_solid_angle(beam)
+    return row
+
+
+def _without(rule: Rule, keys: Iterable[str]) -> Rule:
+    left = {key: value for key, value in rule.values.items() if key not in set(keys)}
+    return replace(rule, values=left)
+
+
+def _brightest(prim: Usd.Prim) -> Usd.TimeCode:
+    """When a photometric light is at its strongest."""
+    names = (light.INTENSITY, light.ILLUMINANCE, "inputs:intensity")
+    for attribute in filter(None, map(prim.GetAttribute, names)):
+        if times := attribute.GetTimeSamples():
+            return Usd.TimeCode(max(times, key=attribute.Get))
+    return Usd.TimeCode.Default()
 
 
 def _level(made: PhotometricLight, places: Sequence[Usd.Prim]) -> float:

@@ -19,8 +19,8 @@ from hdrusd.photometry.interpret import Interpreter
 from hdrusd.photometry.sidecar import Sidecar
 from hdrusd.report import Kind, Report
 from hdrusd.surfaces import SurfaceMaker, material_rows
-from hdrusd.usd.assets import asset_bytes
-from hdrusd.usd.findings import place_of
+from hdrusd.usd.assets import asset_bytes, file_on_disk, in_package
+from hdrusd.usd.findings import first_place, place_of
 from hdrusd.usd.material import Surface
 from hdrusd.usd.network import Findings, Node
 from hdrusd.usd.overs import Overs
@@ -79,7 +79,7 @@ class MaterialOverlay:
             self._photometric += 1
             return
         surface = preview_surface(UsdShade.Material(prim))
-        here = replace(self.place, place=str(prim.GetPath()))
+        here = replace(self.place, place=str(first_place(prim)))
         findings = Findings(self.report, self.place, prim)
         if surface is None:
             text = "no UsdPreviewSurface; kept as it is"
@@ -100,7 +100,7 @@ class MaterialOverlay:
         made = _origin(source, made)
         write_surface_over(self.overs, source, glossed, made, hdr=hdr)
         self._made.append((source, made))
-        self._paths.append(prim.GetPath())
+        self._paths.append(first_place(prim))
 
     def note_kept(self) -> None:
         """A finding for what is photometric already."""
@@ -124,7 +124,8 @@ class MaterialOverlay:
             rows.append(row)
         materials, surfaces = [s.material for s, _ in self._made], [m for _, m in self._made]
         sizes = [row["area_m2"] for row in rows]
-        return rows, image_rows(materials, surfaces, sizes, self.maps.written)
+        images = image_rows(materials, surfaces, sizes, self.maps.made_of, self.maps.broken)
+        return rows, images
 
     def _picture(self, node: Node, name: str) -> Texture | None:
         """The picture of a texture node; of a diffuse colour only 8-bit codes for a screen."""
@@ -133,7 +134,7 @@ class MaterialOverlay:
         if not file:
             return None
         written = str(node.value("file", "").path)
-        real = Path(file.split("[")[0])
+        real = file_on_disk(file)
         if not self.resolver.allowed(real):
             text, code = "not found", "file-missing"
             if real.is_file():
@@ -141,7 +142,7 @@ class MaterialOverlay:
                 text += f"--root {real.parent} would allow it"
             findings.finding(code, f"{written}: {text}", Kind.MISSING)
             return None
-        if "[" in file:
+        if in_package(file):
             image = Image(written, self.place, data=asset_bytes(file))
         else:
             image = Image(written, self.place, path=Path(file).resolve())

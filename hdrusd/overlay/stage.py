@@ -15,12 +15,15 @@ from pathlib import Path
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
+from hdrusd.checking import validate
 from hdrusd.conversion import Options, Result
+from hdrusd.delivery import earlier_files
 from hdrusd.errors import InputError, SourceRef, ValidationError
 from hdrusd.importers.importer import Resolver
 from hdrusd.lamps import temperature_rgb
 from hdrusd.luminaires import LuminaireFiles
 from hdrusd.maps import MapWriter
+from hdrusd.measures import Measures, stated_measures
 from hdrusd.overlay.lights import LightOverlay
 from hdrusd.overlay.materials import MaterialOverlay
 from hdrusd.photometry.estimate import RULES
@@ -43,7 +46,6 @@ from hdrusd.usd.source_stage import (
     source_layer,
 )
 from hdrusd.usd.variant_choices import Brought, Choice, other_variants
-from hdrusd.validation import validate
 
 #: Variants that are selected in turn, outer ones first.
 _Choices = tuple[Choice, ...]
@@ -77,13 +79,13 @@ class Overlay:
         if source.stat().st_size > options.limits.file_bytes:
             raise InputError(source, f"want at most {options.limits.file_bytes} bytes")
         self.stage = open_source(source, self.resolver.allowed, report)
-        unit, up = options.source_unit or sidecar.unit_m, options.up or sidecar.up
-        stated = {"metersPerUnit": unit, "upAxis": up}
-        for key, value in stated.items():
+        asked = Measures(options.source_unit, options.up)
+        own, place = _own_measures(self.stage), SourceRef(source)
+        stated = stated_measures(own, asked, sidecar, place, report, shared=options.shared)
+        for key, value in (("metersPerUnit", stated.unit_m), ("upAxis", stated.up)):
             if value is not None:
                 self.stage.GetRootLayer().pseudoRoot.SetInfo(key, value)
-        said = source_layer(self.stage).pseudoRoot.HasInfo("metersPerUnit")
-        self.unit_stated = said or unit is not None
+        self.unit_stated = own.unit_m is not None or stated.unit_m is not None
         self._check_output()
         count, nested = population(self.stage)
         if nested > _MOST_NESTED:
@@ -100,7 +102,7 @@ class Overlay:
         interpreter = Interpreter(
             RULES[options.estimate], self._diagonal(), 1.0, temperature_rgb, report
         )
-        self.maps = MapWriter(*files, report)
+        self.maps = MapWriter(*files, source.resolve().parent, report)
         beside = sidecar.path or source
         named = Resolver(beside, report, options.roots, options.search, options.limits)
         self.luminaires = LuminaireFiles(*files, named, report)
@@ -133,6 +135,7 @@ class Overlay:
         materials, images = self.materials.account()
         self._save()
         self._validate()
+        self.lights.count_shown()
         result = Result(
             self.output,
             self.report,
@@ -152,6 +155,7 @@ class Overlay:
 
     def _convert(self, brought: Brought | None) -> None:
         """Write over what is there now; ``brought``: only over what a variant brings."""
+        self.lights.selected = brought is None
         shared: dict[Sdf.Path, list[Usd.Prim]] = {}
         for prim in list(all_prims(self.stage)):
             material, light = prim.IsA(UsdShade.Material), is_light(prim)
@@ -212,13 +216,14 @@ class Overlay:
     # -- what is asked and said --------------------------------------------------------------
 
     def _check_output(self) -> None:
-        """Raises InputError where a file of the source would be overwritten."""
+        """Raises InputError where a file of the source would be overwritten, or go."""
         stem = self.output.stem
         folder = self.output.parent.resolve()
-        written = {folder / f"{stem}.usda", folder / f"{stem}.photometry.usda"}
+        replaced = {folder / f"{stem}.usda", folder / f"{stem}.photometry.usda"}
+        replaced.update(file.resolve() for file in earlier_files(self.output))
         for file in files_of(self.stage):
             real = file.resolve()
-            if real in written:
+            if real in replaced:
                 raise InputError(self.output, f"would replace {real}; want another name")
 
     def _note_unused(self) -> None:
@@ -296,3 +301,11 @@ class Overlay:
             kind = Kind.INVALID if problem.severity == "error" else Kind.ASSUMED
             place = SourceRef(self.output)
             self.report.add(kind, "validation", place, str(problem.path), problem.text)
+
+
+def _own_measures(stage: Usd.Stage) -> Measures:
+    said = source_layer(stage).pseudoRoot
+    return Measures(
+        UsdGeom.GetStageMetersPerUnit(stage) if said.HasInfo("metersPerUnit") else None,
+        str(UsdGeom.GetStageUpAxis(stage)) if said.HasInfo("upAxis") else None,
+    )

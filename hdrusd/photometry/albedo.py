@@ -17,7 +17,7 @@ import re
 import unicodedata
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -291,10 +291,11 @@ def reflectance(rgb: Array, weights: Array) -> Reflectance | None:
 class Doubt:
     """A reflectance that cannot be: where it should lie, and the factor on D that brings it there.
 
-    ``decades``: log10 of how far out it is.
+    ``statistic``: which of a reflectance lies outside; ``decades``: log10 of how far out it is.
     """
 
     code: str
+    statistic: Literal["mean", "p95"]
     low: float
     high: float
     factor: float | None  # None: it is 0, which no factor changes
@@ -320,20 +321,30 @@ def doubt(found: Reflectance, surface: SurfaceClass | None, *, dark: bool = Fals
         text = f"{shown}; nothing but fresh snow has more than {BRIGHTEST:g} ({_MCCAMY})"
         return _doubt("reflectance-high", low, high, found.mean, text, _MCCAMY)
     if found.p95 > max(high, BRIGHTEST) + _SLACK:
+        shown = f"95th percentile of the reflectance {found.p95:.3g} (mean {found.mean:.3g})"
         text = f"{shown}; nothing but fresh snow has more than {BRIGHTEST:g} ({_MCCAMY})"
-        return _doubt("reflectance-high", low, max(high, BRIGHTEST), found.p95, text, _MCCAMY)
+        limits = low, max(high, BRIGHTEST)
+        return _doubt("reflectance-high", *limits, found.p95, text, _MCCAMY, "p95")
     if surface is None and found.mean < DARKEST and not dark:
         text = f"{shown}; black paint has {DARKEST:g} and more ({_OKE})"
         return _doubt("reflectance-low", DARKEST, high, found.mean, text, _OKE)
     return None
 
 
-def _doubt(code: str, low: float, high: float, value: float, text: str, citation: str) -> Doubt:
+def _doubt(
+    code: str,
+    low: float,
+    high: float,
+    value: float,
+    text: str,
+    citation: str,
+    statistic: Literal["mean", "p95"] = "mean",
+) -> Doubt:
     bound = high if value > high else low
     if value <= 0.0:
-        return Doubt(code, low, high, None, 1.0, text, citation)
+        return Doubt(code, statistic, low, high, None, 1.0, text, citation)
     factor = bound / value
-    return Doubt(code, low, high, factor, abs(math.log10(factor)), text, citation)
+    return Doubt(code, statistic, low, high, factor, abs(math.log10(factor)), text, citation)
 
 
 def inwards(value: float, factor: float) -> float:

@@ -44,15 +44,17 @@ def to_ies(file: IesFile | EulumdatFile, place: SourceRef, report: Report) -> Ie
     luminaire = file.luminaire(place, report)
     if file.edition == 2019:
         _lost(report, place, f"the file generation {file.companion:g}")
-    planes, candela = _closed(luminaire, np.maximum(file.candela, 0.0))
+    planes, candela = _closed(replace(luminaire, candela=np.maximum(file.candela, 0.0)))
+    keywords = _with_free_text(file, place, report)
     return replace(
         file,
         edition=2002,
-        keywords=_complete(file.keywords, place, report),
+        keywords=_complete(keywords, place, report),
         multiplier=file.multiplier * (file.companion if file.edition <= 1991 else 1.0),
         companion=1.0,
         planes=planes,
         candela=candela,
+        head="",
     )
 
 
@@ -66,7 +68,7 @@ def to_eulumdat(file: IesFile | EulumdatFile, place: SourceRef, report: Report) 
     luminaire = file.luminaire(place, report)
     flux = luminaire.flux()
     peak = float(luminaire.candela.max())
-    stated = file.lamps * file.lumens if file.lumens > 0.0 and file.lamps > 0.0 else 0.0
+    stated = file.lamp_lumens or 0.0
     absolute = stated < _LEAST_LUMENS * peak or stated == 0.0
     lumens = stated
     if absolute:
@@ -116,7 +118,7 @@ def _ies_of_eulumdat(file: EulumdatFile, place: SourceRef, report: Report) -> Ie
     luminaire = file.luminaire(place, report)
     lamp = file.lamps[0]
     count = max(abs(lamp.count), 1.0)
-    text = _Texts(place, report, _IES_TEXT, "latin-1")
+    text = _Texts(place, report, _IES_TEXT)
     said = {
         "TEST": file.test,
         "ISSUEDATE": file.date,
@@ -138,7 +140,7 @@ def _ies_of_eulumdat(file: EulumdatFile, place: SourceRef, report: Report) -> Ie
         _lost(report, place, "heights of the opening that differ by plane; the largest is kept")
     opening = luminaire.opening
     sign = -1.0 if opening.round else 1.0
-    planes, candela = _closed(luminaire, luminaire.candela)
+    planes, candela = _closed(luminaire)
     return IesFile(
         edition=2002,
         keywords=_complete(keywords, place, report),
@@ -164,18 +166,32 @@ def _ies_of_eulumdat(file: EulumdatFile, place: SourceRef, report: Report) -> Ie
     )
 
 
-def _closed(luminaire: Luminaire, candela: Doubles) -> tuple[Doubles, Doubles]:
-    """Planes as LM-63 has them: 90 to 270 for -90 to 90, and a whole turn up to 360."""
-    planes = luminaire.planes
+def _with_free_text(file: IesFile, place: SourceRef, report: Report) -> Mapping[str, str]:
+    """The keywords, and behind [OTHER] what stands without one, in lines that are not too long."""
+    text = _Texts(place, report, _IES_TEXT)
+    said = [
+        text.cut("OTHER", line[start : start + _IES_TEXT])
+        for line in file.free_text
+        for start in range(0, len(line), _IES_TEXT)
+    ]
+    if not said:
+        return file.keywords
+    other = file.keywords.get("OTHER")
+    return {**file.keywords, "OTHER": "\n".join(said if other is None else [other, *said])}
+
+
+def _closed(luminaire: Luminaire) -> tuple[Doubles, Doubles]:
+    """Planes as LM-63 has them: 90 to 270 for -90 to 90, and a whole turn from 0 to 360."""
+    planes, candela = luminaire.planes, luminaire.candela
     if luminaire.type != "C":
         return planes, candela
     if len(planes) == 1:
         return np.zeros(1), candela
-    if planes[0] == -90.0:  # I(C) = I(180 - C)
+    if planes[0] == -90.0 and planes[-1] == 90.0:  # I(C) = I(180 - C)
         return 180.0 - planes[::-1], candela[::-1]
-    if (planes[0], planes[-1]) in ((0.0, 90.0), (0.0, 180.0), (90.0, 270.0), (0.0, 360.0)):
+    if (planes[0], planes[-1]) in ((0.0, 90.0), (0.0, 180.0), (90.0, 270.0)):
         return planes, candela
-    return np.append(planes, 360.0), np.concatenate([candela, candela[:1]])
+    return luminaire.unfolded()
 
 
 def _stored(
@@ -194,8 +210,9 @@ def _stored(
         if len(planes) % 4 == 0 and (planes[quarter], planes[3 * quarter]) == (90.0, 270.0):
             symmetry = 3
             rows = candela[np.arange(3 * quarter, 5 * quarter + 1) % len(planes)]
-    elif ends == (0.0, 360.0) and (candela[0] != candela[-1]).any():
-        _lost(report, file.at("planes", len(luminaire.planes) - 1), "plane 360, other than plane 0")
+    elif ends[1] == ends[0] + 360.0 and (luminaire.candela[0] != luminaire.candela[-1]).any():
+        what = f"plane {ends[1]:g}, other than plane {ends[0]:g}"
+        _lost(report, file.at("planes", len(luminaire.planes) - 1), what)
     if len(planes) > MOST_ANGLES or rows.size > MOST_VALUES:
         raise InputError(place, f"{len(planes)} C planes without symmetry; want fewer planes")
     return symmetry, planes, rows
@@ -204,6 +221,8 @@ def _stored(
 def _tell_what_eulumdat_lacks(file: IesFile, place: SourceRef, report: Report) -> None:
     text = "LM-63 has none of these: type indicator 3, direct ratios 0, housing as the opening"
     report.add(Kind.ASSUMED, "photometric-filled", place, "", text)
+    if file.free_text:
+        _lost(report, place, "text without a keyword")
     others = sorted(file.keywords.keys() - _CARRIED - {_COLOUR, _RENDERING, ""})
     if others:
         _lost(report, place, f"keywords {', '.join(others)}")
@@ -258,17 +277,15 @@ def _seven(values: Doubles) -> Doubles:
 
 
 class _Texts:
-    """Texts as lines of the other format; what is cut or has no letter there is a finding."""
+    """Texts as lines of the other format; what is cut is a finding."""
 
-    def __init__(
-        self, place: SourceRef, report: Report, most: int = LDT_TEXT, encoding: str = "utf-8"
-    ) -> None:
-        self.place, self.report, self.most, self.encoding = place, report, most, encoding
+    def __init__(self, place: SourceRef, report: Report, most: int = LDT_TEXT) -> None:
+        self.place, self.report, self.most = place, report, most
 
     def cut(self, what: str, text: str) -> str:
         """One line without control characters."""
         line = "".join(c if c.isprintable() else " " for c in text).strip()
-        kept = line.encode(self.encoding, "replace").decode(self.encoding)[: self.most].strip()
+        kept = line[: self.most].strip()
         if kept != line:
-            _lost(self.report, self.place, f"{what}: letters or length beyond {self.most}")
+            _lost(self.report, self.place, f"{what}: what is beyond {self.most} letters")
         return kept

@@ -43,8 +43,8 @@ def data_sheet(examined: Examined) -> dict[str, Any]:
         "zones_deg": list(ZONES),
         "zonal_flux_lm": [_digits(value) for value in zonal_flux(lamp)],
         "upward_light_ratio": _digits(upward_share(lamp)),
-        "lamp_flux_lm": _digits(_lamp_flux(file)),
-        "light_output_ratio": _digits(_ratio(flux, _lamp_flux(file))),
+        "lamp_flux_lm": _digits(lamp.lumens),
+        "light_output_ratio": _digits(_ratio(flux, lamp.lumens)),
         "watts": _digits(_watts(file)),
         "efficacy_lm_w": _digits(_ratio(flux, _watts(file))),
         "beam_deg": {section.name: _digits(fan(section, 0.5)) for section in sections(lamp)},
@@ -88,13 +88,6 @@ def _of_eulumdat(file: EulumdatFile) -> dict[str, Any]:
         "keywords": {key: value for key, value in keywords.items() if value},
         "factors": {"conversion": file.conversion, "all": _digits(file.factor)},
     }
-
-
-def _lamp_flux(file: IesFile | EulumdatFile) -> float | None:
-    """Lumens of all lamps; None where the file is absolute."""
-    if isinstance(file, IesFile):
-        return file.lamps * file.lumens if file.lumens > 0.0 else None
-    return file.lamps[0].lumens if file.lamps[0].count > 0.0 else None
 
 
 def _watts(file: IesFile | EulumdatFile) -> float | None:

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hdrusd.errors import InputError, SourceRef
+from hdrusd.photometry.file_text import decoded, encoded
 from hdrusd.photometry.luminaire import (
     MOST_ANGLES,
     MOST_BYTES,
@@ -40,6 +41,12 @@ _MOST_SETS = 20
 _MOST_LINES = MOST_VALUES + 3 * MOST_ANGLES
 
 _MILLIMETRE = 1e-3
+
+#: Degrees by which a plane may be off the end of a symmetry.
+_NEAR = 0.01
+
+#: First and last of the C planes that a symmetry leaves.
+_ENDS = {2: ((0.0, 180.0),), 3: ((-90.0, 90.0), (90.0, 270.0)), 4: ((0.0, 90.0),)}
 
 _UNREADABLE = "want an EULUMDAT file"
 
@@ -95,12 +102,12 @@ class EulumdatFile:
             lumens = self.lamps[0].lumens
             text = f"{len(self.lamps)} sets of lamps; the first, of {lumens:g} lm, is shown"
             report.add(Kind.ASSUMED, "profile-lamp-sets", SourceRef(place.file, 26), "", text)
-        chosen = _stored(self.symmetry, len(self.planes), place)
+        chosen = _stored(self.symmetry, self.planes, place)
         planes = _stored_planes(self.symmetry, self.planes, chosen, self.at)
         candela = self.candela
-        if self.symmetry == 0 and abs(planes[0]) < 0.01 and 0.01 < planes[-1] < 359.99:
+        if self.symmetry == 0 and 0.01 < planes[-1] - planes[0] < 359.99:
             # All round: 0 and 90 alone are no quadrant here.
-            planes = np.append(planes, 360.0)
+            planes = np.append(planes, planes[0] + 360.0)
             candela = np.concatenate([candela, candela[:1]])
         keywords = {"MANUFAC": self.company, "LUMINAIRE": self.name, "LUMCAT": self.number}
         return checked(
@@ -145,14 +152,14 @@ def parse_eulumdat(data: bytes, place: SourceRef, report: Report) -> EulumdatFil
     lines.number(_HEADER + 3, "luminous flux")
     lines.number(_HEADER + 1, "number of lamps")
 
-    stored = len(_stored(symmetry, plane_count, SourceRef(place.file, 4)))
-    if stored * angle_count > MOST_VALUES:
-        problem = f"{stored} x {angle_count} intensities; want at most {MOST_VALUES}"
-        raise InputError(place, problem)
     start = _HEADER + _LAMP * sets + _RATIOS + 1
     first = {"planes": start, "angles": start + plane_count}
     first["candela"] = first["angles"] + angle_count
     planes = lines.numbers(start, plane_count, "C planes")
+    stored = len(_stored(symmetry, planes, SourceRef(place.file, 4)))
+    if stored * angle_count > MOST_VALUES:
+        problem = f"{stored} x {angle_count} intensities; want at most {MOST_VALUES}"
+        raise InputError(place, problem)
     angles = lines.numbers(first["angles"], angle_count, "gamma angles")
     candela = lines.numbers(first["candela"], stored * angle_count, "luminous intensities")
     lines.finish(first["candela"] + stored * angle_count, report)
@@ -187,7 +194,7 @@ def parse_eulumdat(data: bytes, place: SourceRef, report: Report) -> EulumdatFil
 def write_eulumdat(file: EulumdatFile) -> bytes:
     """The bytes of an EULUMDAT file, every digit kept: ``parse_eulumdat`` gives ``file``.
 
-    Latin-1, or UTF-8 where that cannot say it.
+    Latin-1, or UTF-8 where that cannot say it: see ``file_text``.
     """
     lines: list[str] = [file.company]
     lines += map(str, (file.type_indicator, file.symmetry, len(file.planes)))
@@ -201,12 +208,7 @@ def write_eulumdat(file: EulumdatFile) -> bytes:
         lines += [plain(lamp.watts)]
     for values in (file.ratios, file.planes, file.angles, file.candela):
         lines += map(plain, values.ravel().tolist())
-    text = "".join(f"{line}\r\n" for line in lines)
-    try:
-        data = text.encode("latin-1")
-    except UnicodeEncodeError:
-        return text.encode("utf-8")
-    return data if _decoded(data) == text else text.encode("utf-8")
+    return encoded("".join(f"{line}\r\n" for line in lines))
 
 
 def _lamp_set(lines: _Lines, line: int) -> LampSet:
@@ -220,15 +222,33 @@ def _lamp_set(lines: _Lines, line: int) -> LampSet:
     )
 
 
-def _stored(symmetry: int, count: int, place: SourceRef) -> Indices:
+def listed_alone(symmetry: int, planes: Doubles) -> bool:
+    """Whether the C planes are only those that the symmetry leaves, and not the whole turn.
+
+    The format wants all of them. What is meant is plain, as the ends are those of the symmetry.
+    """
+    return any(np.abs(planes[[0, -1]] - ends).max() <= _NEAR for ends in _ENDS.get(symmetry, ()))
+
+
+def listed_twice(planes: Doubles) -> bool:
+    """Whether the C planes end with the first one again, at 360."""
+    return bool(np.abs(planes[[0, -1]] - (0.0, 360.0)).max() <= _NEAR)
+
+
+def _stored(symmetry: int, planes: Doubles, place: SourceRef) -> Indices:
     """Indices, from 0, of the C planes whose intensities the file has, in its order."""
-    parts = {0: 1, 1: 1, 2: 2, 3: 4, 4: 4}[symmetry]
+    if symmetry == 1:
+        return np.arange(1)
+    count = len(planes)
+    if listed_alone(symmetry, planes):
+        return np.arange(count)
+    if symmetry in (2, 4) and listed_twice(planes):
+        count -= 1
+    parts = {0: 1, 2: 2, 3: 4, 4: 4}[symmetry]
     if count % parts:
         raise InputError(
             place, f"{count} C planes; symmetry {symmetry} wants a multiple of {parts}"
         )
-    if symmetry == 1:
-        return np.arange(1)
     if symmetry == 3:  # from C 270 over 360 = 0 to C 90
         return np.arange(3 * count // 4, 3 * count // 4 + count // 2 + 1) % count
     return np.arange({0: count, 2: count // 2 + 1, 4: count // 4 + 1}[symmetry])
@@ -239,13 +259,14 @@ def _stored_planes(symmetry: int, planes: Doubles, chosen: Indices, at: At) -> D
     angles = planes[chosen]
     if symmetry == 1:
         return np.zeros(1)
-    if symmetry == 3:
+    if symmetry == 3 and not listed_alone(symmetry, planes):
         angles = np.where(np.arange(len(angles)) < len(planes) // 4, angles - 360.0, angles)
-    ends = {2: (0.0, 180.0), 3: (-90.0, 90.0), 4: (0.0, 90.0)}.get(symmetry)
-    if ends is not None and np.abs(angles[[0, -1]] - ends).max() > 0.01:
+    ends = _ENDS.get(symmetry)
+    if ends is not None and all(np.abs(angles[[0, -1]] - end).max() > _NEAR for end in ends):
+        (first, last), *_ = ends
         text = f"C planes {angles[0]:g} to {angles[-1]:g} of symmetry {symmetry}"
-        wrong = 0 if abs(angles[0] - ends[0]) > 0.01 else -1
-        problem = f"{text}; want {ends[0]:g} to {ends[1]:g}"
+        wrong = 0 if abs(angles[0] - first) > _NEAR else -1
+        problem = f"{text}; want {first:g} to {last:g}"
         raise InputError(at("planes", int(chosen[wrong])), problem)
     return np.asarray(angles)
 
@@ -256,19 +277,11 @@ def _metres(size: float) -> float:
     return value if 0.0 < value < 1e6 else 0.0
 
 
-def _decoded(data: bytes) -> str:
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("latin-1")
-
-
 class _Lines:
     """The lines of a file, counted from 1 as the format does."""
 
     def __init__(self, data: bytes, place: SourceRef) -> None:
-        text = _decoded(data).replace("\r\n", "\n").replace("\r", "\n")
-        lines = text.split("\n", _MOST_LINES)[:_MOST_LINES]
+        lines = decoded(data).split("\n", _MOST_LINES)[:_MOST_LINES]
         self.text = [line.strip(" \t\x00\x1a") for line in lines]
         self.place = place
         self.unreadable: list[int] = []

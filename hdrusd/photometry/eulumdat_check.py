@@ -9,7 +9,7 @@ import numpy as np
 from hdrusd.errors import SourceRef
 from hdrusd.photometry.conversion import LDT_TEXT
 from hdrusd.photometry.distribution import cumulative_flux
-from hdrusd.photometry.eulumdat import EulumdatFile
+from hdrusd.photometry.eulumdat import EulumdatFile, listed_alone, listed_twice
 from hdrusd.photometry.luminaire import Doubles, Luminaire
 from hdrusd.report import Kind, Report
 
@@ -54,7 +54,7 @@ def check_eulumdat(
         text = f"type indicator {file.type_indicator}, but symmetry {file.symmetry}"
         tell("photometric-symmetry", 2, f"{text}; both 1 for a figure of rotation")
     for line, what, stated, values in (
-        (5, "C planes", file.plane_step, np.append(file.planes, 360.0)),
+        (5, "C planes", file.plane_step, _turn(file)),
         (7, "gamma angles", file.angle_step, file.angles),
     ):
         if stated != 0.0 and len(values) > 2 and not _has_step(values, stated):
@@ -66,8 +66,31 @@ def check_eulumdat(
     if file.angles[0] != 0.0 and file.angles[0] != 90.0:
         text = f"gamma starts at {file.angles[0]:g}; want 0"
         report.add(Kind.INVALID, "photometric-angles", file.at("angles", 0), "", text)
+    _check_planes(file, report)
     _check_lamps(file, tell)
     _check_shares(file, luminaire, tell)
+
+
+def _turn(file: EulumdatFile) -> Doubles:
+    """The C planes with the first one once more, where all of the turn is listed."""
+    if listed_alone(file.symmetry, file.planes) or listed_twice(file.planes):
+        return file.planes
+    return np.append(file.planes, file.planes[0] + 360.0)
+
+
+def _check_planes(file: EulumdatFile, report: Report) -> None:
+    def tell(index: int, text: str) -> None:
+        place = file.at("planes", index)
+        report.add(Kind.INVALID, "photometric-angles", place, "", text)
+
+    last = len(file.planes) - 1
+    first, end = float(file.planes[0]), float(file.planes[last])
+    if first != 0.0:
+        tell(0, f"C planes start at {first:g}; want 0")
+    if listed_twice(file.planes):
+        tell(last, f"C plane {end:g} is the first one again; want those below 360")
+    elif listed_alone(file.symmetry, file.planes):
+        tell(last, f"C planes end at {end:g}, as symmetry {file.symmetry} does; want all round")
 
 
 def _check_lamps(file: EulumdatFile, tell: _Tell) -> None:

@@ -54,15 +54,15 @@ def examine(
 
 
 def _check_lumens(file: IesFile, luminaire: Luminaire, report: Report) -> None:
-    stated, flux = file.lamps * file.lumens, luminaire.flux()
-    if file.lumens > 0.0 and flux > stated * (1.0 + _ROOM):
+    stated, flux = file.lamp_lumens, luminaire.flux()
+    if stated is not None and flux > stated * (1.0 + _ROOM):
         text = f"lamps of {stated:g} lm, but the candela give {flux:.5g} lm"
         place = file.at("lamps, lumens and multiplier", 1)
         report.add(Kind.INVALID, "photometric-flux", place, "", text)
 
 
 def _check_directions(file: IesFile | EulumdatFile, luminaire: Luminaire, report: Report) -> None:
-    """Nadir and zenith are one direction in all planes, plane 360 is plane 0."""
+    """Nadir and zenith are one direction in all planes; after a whole turn the first is again."""
     candela = luminaire.candela
     room = _ROOM * float(candela.max())
     for column, pole in ((0, 0.0), (len(luminaire.angles) - 1, 180.0)):
@@ -71,7 +71,8 @@ def _check_directions(file: IesFile | EulumdatFile, luminaire: Luminaire, report
             text = f"{values.min():g} to {values.max():g} cd at gamma {pole:g}, by the plane"
             report.add(Kind.INVALID, "photometric-pole", file.at("candela", column), "", text)
     last = len(luminaire.planes) - 1
-    whole = isinstance(file, IesFile) and luminaire.planes[last] == 360.0
+    first, end = float(luminaire.planes[0]), float(luminaire.planes[last])
+    whole = isinstance(file, IesFile) and end - first == 360.0
     if whole and np.abs(candela[0] - candela[last]).max() > room:
-        text = "plane 360 differs from plane 0, which is the same"
+        text = f"plane {end:g} differs from plane {first:g}, which is the same"
         report.add(Kind.INVALID, "photometric-symmetry", file.at("planes", last), "", text)

@@ -10,13 +10,14 @@ place for other things. The lumens of the lamps do not scale anything.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
 
 from hdrusd.errors import InputError, SourceRef
+from hdrusd.photometry.file_text import decoded, encoded
 from hdrusd.photometry.luminaire import (
     MOST_ANGLES,
     MOST_BYTES,
@@ -57,6 +58,9 @@ _EDITIONS = {"86": 1986, "91": 1991, "95": 1995, "02": 2002, "19": 2019}
 _TILT = re.compile(r"^[ \t]*TILT[ \t]*=[ \t]*([^\r\n]*)", re.I | re.M)
 _KEYWORD = re.compile(r"\s*\[([^\[\]]{1,40})\]\s*(.*)")
 _WORD = re.compile(r"[^\s,]+")
+
+#: A comma that is a separator to LM-63, and to some who write it the decimal sign.
+_COMMA = re.compile(r"\d,\d")
 _TYPES: dict[int, Type] = {1: "C", 2: "B", 3: "A"}
 
 #: Lines of one lamp's tilt: more angles than a goniometer has stops are no tilt.
@@ -98,6 +102,22 @@ class IesFile:
     at: At
 
     @property
+    def lamp_lumens(self) -> float | None:
+        """Lumens of all lamps; None of absolute photometry."""
+        return self.lamps * self.lumens if self.lamps > 0.0 and self.lumens > 0.0 else None
+
+    @property
+    def free_text(self) -> list[str]:
+        """The lines without a keyword, as 1986 has them, less the label and empty ones."""
+        lines = self.head.split("\n")
+        at = label_line(lines)
+        return [
+            line.strip()
+            for number, line in enumerate(lines)
+            if line.strip() and number != at and keyword(line) is None
+        ]
+
+    @property
     def factor(self) -> float:
         """What the candela are multiplied by, in a level luminaire."""
         factor = self.multiplier * self.ballast
@@ -119,7 +139,7 @@ class IesFile:
             angles=self.angles,
             candela=self.candela,
             factor=self.factor,
-            lumens=None if self.lumens < 0.0 else self.lumens,
+            lumens=self.lamp_lumens,
             opening=_opening(*self.size, _FOOT if self.feet else 1.0),
             keywords=keywords,
             at=self.at,
@@ -128,7 +148,7 @@ class IesFile:
 
 def is_ies(data: bytes) -> bool:
     """Whether bytes look like LM-63 rather than EULUMDAT: every LM-63 file has a TILT line."""
-    return _TILT.search(_text(data[:MOST_BYTES])) is not None
+    return _TILT.search(decoded(data[:MOST_BYTES])) is not None
 
 
 def read_ies(
@@ -153,7 +173,7 @@ def parse_ies(
     """
     if len(data) > MOST_BYTES:
         raise InputError(place, f"{len(data)} bytes; want at most {MOST_BYTES}")
-    text = _text(data)
+    text = decoded(data)
     tilt = _TILT.search(text)
     if tilt is None:
         raise InputError(place, "no TILT= line; want an IES LM-63 file")
@@ -167,19 +187,17 @@ def parse_ies(
     sizes = numbers.counts(2, "counts of angles", MOST_ANGLES)
     if sizes[0] * sizes[1] > MOST_VALUES:
         problem = f"{sizes[0]} x {sizes[1]} candela; want at most {MOST_VALUES}"
-        raise InputError(numbers.at("counts of angles"), problem)
+        raise numbers.problem("counts of angles", 0, problem)
     type_code, units = numbers.counts(2, "photometric type and units", 3)
     if type_code not in _TYPES or units not in (1, 2):
-        raise InputError(
-            numbers.at("photometric type and units"),
-            f"type {type_code}, units {units}; want type 1, 2 or 3, units 1 or 2",
-        )
+        problem = f"type {type_code}, units {units}; want type 1, 2 or 3, units 1 or 2"
+        raise numbers.problem("photometric type and units", 0, problem)
     width, length, height = numbers.take(3, "width, length and height").tolist()
     ballast, companion, watts = numbers.take(3, "ballast factor, its companion and watts").tolist()
     angles = numbers.take(sizes[0], "vertical angles")
     planes = numbers.take(sizes[1], "horizontal angles")
     candela = numbers.take(sizes[0] * sizes[1], "candela").reshape(sizes[1], sizes[0])
-    numbers.finish(report)
+    numbers.finish("candela", report)
     return IesFile(
         edition=edition,
         keywords=keywords,
@@ -204,18 +222,14 @@ def parse_ies(
 def write_ies(file: IesFile) -> bytes:
     """The bytes of an LM-63 file, every digit kept: ``parse_ies`` of them gives ``file``.
 
-    Latin-1, as files are written that are not plain ASCII; "?" for what it has not.
+    ASCII as LM-63 wants it, but for texts that have other letters: see ``file_text``.
     """
     lines = [LABELS[file.edition]] if LABELS[file.edition] else []
     for key, value in file.keywords.items():
         name = key if key in KEYWORDS else f"_{key}"
         first, *more = value.split("\n")
         lines += [f"[{name}] {first}".rstrip(), *(f"[MORE] {line}".rstrip() for line in more)]
-    if file.tilt is None:
-        lines.append("TILT=NONE")
-    else:
-        lines += ["TILT=INCLUDE", plain(file.tilt.geometry), str(len(file.tilt.angles))]
-        lines += [*_wrapped(file.tilt.angles), *_wrapped(file.tilt.factors)]
+    lines += ["TILT=NONE"] if file.tilt is None else _tilt_lines(file.tilt)
     code = next(code for code, type in _TYPES.items() if type == file.type)
     counts = f"{len(file.angles)} {len(file.planes)} {code} {1 if file.feet else 2}"
     lamps = _row([file.lamps, file.lumens, file.multiplier])
@@ -224,7 +238,7 @@ def write_ies(file: IesFile) -> bytes:
     lines += [*_wrapped(file.angles), *_wrapped(file.planes)]
     for plane in file.candela:
         lines += _wrapped(plane)
-    return "".join(f"{line}\r\n" for line in lines).encode("latin-1", "replace")
+    return encoded("".join(f"{line}\r\n" for line in lines))
 
 
 def _row(values: Iterable[float]) -> str:
@@ -236,31 +250,34 @@ def _wrapped(values: Doubles) -> list[str]:
     return [_row(listed[i : i + _A_LINE]) for i in range(0, len(listed), _A_LINE)]
 
 
-def with_tilt(data: bytes, tilt_file: Callable[[str], bytes | None]) -> bytes:
-    """An LM-63 file that stands alone: what ``TILT=name`` names is put into its place.
+def with_tilt(data: bytes, file: IesFile) -> bytes:
+    """The bytes that ``file`` was read from, made to stand alone.
 
-    LM-63 has the same lines behind ``TILT=INCLUDE``. As it was where there is no such file.
+    The numbers of the file that ``TILT=name`` names are put into its place, as LM-63 has them
+    behind ``TILT=INCLUDE``. As it was where there is no such file.
     """
-    text = _text(data)
+    text = decoded(data)
     tilt = _TILT.search(text)
-    if tilt is None or tilt[1].strip().upper() in ("NONE", "INCLUDE"):
+    if tilt is None or file.tilt is None or tilt[1].strip().upper() == "INCLUDE":
         return data
-    included = tilt_file(tilt[1].strip())
-    if included is None or len(included) > MOST_BYTES:
-        return data
-    lines = _text(included).strip("\n")
-    return f"{text[: tilt.start()]}TILT=INCLUDE\n{lines}{text[tilt.end() :]}".encode("latin-1")
+    lines = "\n".join(_tilt_lines(file.tilt))
+    return encoded(f"{text[: tilt.start()]}{lines}{text[tilt.end() :]}")
+
+
+def _tilt_lines(tilt: Tilt) -> list[str]:
+    head = ["TILT=INCLUDE", plain(tilt.geometry), str(len(tilt.angles))]
+    return [*head, *_wrapped(tilt.angles), *_wrapped(tilt.factors)]
 
 
 def _header(text: str, place: SourceRef, report: Report) -> tuple[int, dict[str, str]]:
     """The edition by its label, and the keywords; [MORE] goes on with the last one."""
-    lines = text.splitlines()
-    label = _LABEL.match(lines[0].strip()) if lines else None
+    lines = text.split("\n")
+    at = label_line(lines)
+    label = None if at is None else _LABEL.match(lines[at].strip())
     if label is None:
-        named = bool(lines) and lines[0].strip().upper().startswith("IES")
-        edition = 2019 if named else 1986
-        text = f"{'an unknown' if named else 'no'} edition label; read as LM-63-{edition}"
-        report.add(Kind.ASSUMED, "profile-edition", SourceRef(place.file, 1), "", text)
+        edition = 1986 if at is None else 2019
+        text = f"{'no' if at is None else 'an unknown'} edition label; read as LM-63-{edition}"
+        report.add(Kind.ASSUMED, "profile-edition", SourceRef(place.file, (at or 0) + 1), "", text)
     else:
         edition = _EDITIONS[label[1]]
     keywords: dict[str, list[str]] = {}
@@ -274,14 +291,16 @@ def _header(text: str, place: SourceRef, report: Report) -> tuple[int, dict[str,
     return edition, {key: "\n".join(values) for key, values in keywords.items()}
 
 
+def label_line(lines: Sequence[str]) -> int | None:
+    """Index of the line that names the edition, the first that is not empty; 1986 has none."""
+    at = next((number for number, line in enumerate(lines) if line.strip()), None)
+    return at if at is not None and lines[at].strip().upper().startswith("IES") else None
+
+
 def keyword(line: str) -> tuple[str, str] | None:
     """Name and value of a line that has a keyword; a user's name is without its underscore."""
     found = _KEYWORD.match(line)
     return None if found is None else (found[1].strip().upper().lstrip("_ "), found[2].strip())
-
-
-def _text(data: bytes) -> str:
-    return data.decode("latin-1").replace("\r\n", "\n").replace("\r", "\n")
 
 
 def _tilt(
@@ -297,14 +316,16 @@ def _tilt(
             text = f"TILT={kind}: no such file; the lamp is taken to give its all"
             report.add(Kind.MISSING, "profile-tilt", place, "", text)
             return None
-        numbers = _Numbers(_text(data), SourceRef(place.file, f"{kind}:1"))
+        numbers = _Numbers(decoded(data), SourceRef(place.file, f"{kind}:1"))
     (geometry,) = numbers.take(1, "lamp to luminaire geometry").tolist()
     (count,) = numbers.counts(1, "count of tilt angles", _MOST_TILT)
     angles = numbers.take(count, "tilt angles")
     factors = numbers.take(count, "tilt factors")
     if (angles[1:] <= angles[:-1]).any() or max(np.abs(angles).max(), np.abs(factors).max()) > 360:
         problem = "tilt: want ascending angles and factors near 1"
-        raise InputError(numbers.at("tilt angles"), problem)
+        raise numbers.problem("tilt angles", 0, problem)
+    if numbers.place != place:
+        numbers.finish("tilt factor", report)
     text = "the lamp's output depends on its tilt; the luminaire is taken to be level"
     report.add(Kind.ASSUMED, "profile-tilt", place, "", text)
     return Tilt(geometry, angles, factors)
@@ -335,10 +356,15 @@ class _Numbers:
 
     def at(self, part: str, index: int = 0) -> SourceRef:
         """The line of the ``index``-th number of a part, or of the part after it."""
-        name = _PARTS.get(part, part)
-        start = self.starts.get(name, 0)
+        return self._line(self._offset(part, index))
+
+    def _offset(self, part: str, index: int) -> int:
+        start = self.starts.get(_PARTS.get(part, part), 0)
         word = next(islice(_WORD.finditer(self.text, start), index, None), None)
-        lines = self.text.count("\n", 0, len(self.text.rstrip()) if word is None else word.start())
+        return len(self.text.rstrip()) if word is None else word.start()
+
+    def _line(self, offset: int) -> SourceRef:
+        lines = self.text.count("\n", 0, offset)
         first = self.place.place
         if isinstance(first, str):  # in the file that TILT= names
             return SourceRef(self.place.file, f"{first.rpartition(':')[0]}:{lines + 1}")
@@ -352,16 +378,15 @@ class _Numbers:
         chosen += [word[0] for word in islice(self.words, count - 1)]
         if len(chosen) < count:
             problem = f"{what}: {len(chosen)} numbers left; want {count}"
-            raise InputError(self.at(what, len(chosen)), problem)
+            raise self.problem(what, len(chosen), problem)
         try:
             values = np.array([float(token) for token in chosen], np.float64)
         except ValueError:
-            raise InputError(
-                self.at(what, _first_bad(chosen)), f"{what}: no number among them"
-            ) from None
+            problem = f"{what}: no number among them"
+            raise self.problem(what, _first_bad(chosen), problem) from None
         if not np.isfinite(values).all() or any("_" in token for token in chosen):
             problem = f"{what}: no finite number among them"
-            raise InputError(self.at(what, _first_bad(chosen)), problem)
+            raise self.problem(what, _first_bad(chosen), problem)
         return values
 
     def counts(self, count: int, what: str, most: int) -> list[int]:
@@ -369,16 +394,41 @@ class _Numbers:
         values = self.take(count, what)
         if ((values < 1) | (values > most) | (values != np.round(values))).any():
             shown = ", ".join(f"{value:g}" for value in values)
-            raise InputError(self.at(what), f"{what}: {shown}; want integers from 1 to {most}")
+            problem = f"{what}: {shown}; want integers from 1 to {most}"
+            raise self.problem(what, 0, problem)
         return [int(value) for value in values]
 
-    def finish(self, report: Report) -> None:
-        """A finding where something follows; DOS ends a text with 0x1A."""
+    def problem(self, part: str, index: int, text: str) -> InputError:
+        """What is wrong with a part, and why, where a decimal comma has made two numbers of one."""
+        offset = self._offset(part, index)
+        end = self.text.find("\n", offset)
+        comma = self._comma(len(self.text) if end < 0 else end)
+        if comma is not None:
+            text += f"; {comma[0]!r} in line {comma[1].place}: decimal commas? want points"
+        return InputError(self._line(offset), text)
+
+    def _comma(self, end: int) -> tuple[str, SourceRef] | None:
+        """The first word with a comma between digits before ``end``, and its line."""
+        found = _COMMA.search(self.text, 0, end)
+        if found is None:
+            return None
+        near = self.text[max(found.start() - 12, 0) : found.end() + 12].split()
+        return next(word for word in near if _COMMA.search(word)), self._line(found.start())
+
+    def finish(self, last: str, report: Report) -> None:
+        """A finding where something follows; DOS ends a text with 0x1A.
+
+        Raises InputError for numbers that decimal commas have made.
+        """
         rest = next((word for word in self.words if word[0].strip("\x00\x1a")), None)
-        if rest is not None:
-            self.starts["rest"] = rest.start()
-            text = "what follows the last candela is not read"
-            report.add(Kind.DROPPED, "profile-trailing", self.at("rest"), "", text)
+        if rest is None:
+            return
+        comma = self._comma(rest.start())
+        if comma is not None and _is_number(rest[0]):
+            text = f"{comma[0]!r}, and more numbers than declared: decimal commas? want points"
+            raise InputError(comma[1], text)
+        text = f"what follows the last {last} is not read"
+        report.add(Kind.DROPPED, "profile-trailing", self._line(rest.start()), "", text)
 
 
 #: What ``luminaire.checked`` calls the parts.
@@ -387,11 +437,11 @@ _PARTS = {"planes": "horizontal angles", "angles": "vertical angles"}
 
 def _first_bad(words: list[str]) -> int:
     """Index of the first word that is no finite number."""
-    for index, word in enumerate(words):
-        try:
-            if "_" not in word and np.isfinite(float(word)):
-                continue
-        except ValueError:
-            pass
-        return index
-    return 0
+    return next((index for index, word in enumerate(words) if not _is_number(word)), 0)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        return "_" not in word and bool(np.isfinite(float(word)))
+    except ValueError:
+        return False

@@ -6,7 +6,7 @@ import numpy as np
 
 from hdrusd.errors import SourceRef
 from hdrusd.photometry.conversion import REQUIRED
-from hdrusd.photometry.ies import KEYWORDS, LABELS, IesFile, keyword
+from hdrusd.photometry.ies import KEYWORDS, LABELS, IesFile, keyword, label_line
 from hdrusd.report import Kind, Report
 
 #: Characters of a line in LM-63-2002 and 2019.
@@ -65,12 +65,16 @@ def _check_head(file: IesFile, place: SourceRef, report: Report) -> None:
         told.setdefault(text, [line, 0])[1] += 1
 
     strict = file.edition >= 2002
-    lines = file.head.splitlines()
+    lines = file.head.split("\n")[:-1]
     label = LABELS[file.edition]
-    labelled = bool(lines) and lines[0].strip().upper().startswith("IES")
-    if labelled and lines[0].rstrip() != label:
-        tell(1, f"label {lines[0].strip()!r}; want {label!r}")
-    for number, line in enumerate(lines[labelled:], start=1 + labelled):
+    at = label_line(lines)
+    if at is not None and lines[at].rstrip() != label:
+        tell(at + 1, f"label {lines[at].strip()!r}; want {label!r}")
+    if at:
+        tell(1, "empty lines before the label; want it first")
+    for number, line in enumerate(lines, start=1):
+        if number - 1 == at:
+            continue
         found = keyword(line)
         if strict and len(line) > _LINE:
             tell(number, f"a line of more than {_LINE} characters")

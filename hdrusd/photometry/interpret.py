@@ -93,12 +93,19 @@ class Interpreter:
     report: Report
 
     def light(
-        self, light: legacy.Light, rule: Rule | None, file: LuminaireFile | None = None
+        self,
+        light: legacy.Light,
+        rule: Rule | None,
+        file: LuminaireFile | None = None,
+        *,
+        metres: float | None = None,
     ) -> PhotometricLight | None:
         """The lamp, or None where it is switched off or dark. House rule: one light, end to end.
 
-        ``file``: that of the rule's ``ies``, if there is one and it can be read.
+        ``file``: that of the rule's ``ies``, if there is one and it can be read. ``metres``: that
+        a unit of the light's own space measures in the world; None: as many as a source unit.
         """
+        metres = self.unit if metres is None else metres
         enabled = light.enabled if rule is None else rule.values.get("enabled", light.enabled)
         if not enabled:
             self._note(light, Kind.DROPPED, "light-off", "switched off; not written")
@@ -141,8 +148,8 @@ class Interpreter:
         if kind == "distant":
             return lamp
         if file is not None:
-            return self._with_file(lamp, light, rule, file)
-        return self._with_lamp(lamp, light, rule)
+            return self._with_file(lamp, light, rule, file, metres)
+        return self._with_lamp(lamp, light, rule, metres)
 
     def _with_file(
         self,
@@ -150,21 +157,25 @@ class Interpreter:
         light: legacy.Light,
         rule: Rule | None,
         file: LuminaireFile,
+        metres: float,
     ) -> PhotometricLight:
         """What a photometric file says in the place of a cone: where the light goes, its size."""
         if light.spot_cutoff < 180.0 or light.spot_exponent > 0.0:
             text = f"cone and exponent replaced by the candela of {file.luminaire.name}"
             self._note(light, Kind.REPLACED, "light-cone", text)
-        radius = self._radius(light, rule, _opening_radius(file.luminaire.opening))
+        radius = self._radius(light, rule, metres, _opening_radius(file.luminaire.opening))
         return replace(lamp, profile=file.name, radius=radius)
 
     def _radius(
-        self, light: legacy.Light, rule: Rule | None, of_file: float | None = None
+        self, light: legacy.Light, rule: Rule | None, metres: float, of_file: float | None = None
     ) -> float:
-        """The lamp's size: of the rule, the photometric file, the source, else a stated guess."""
+        """The lamp's size, m: of the rule, the photometric file, the source, else a stated guess.
+
+        That of the source is in the light's own space; a unit of it measures ``metres``.
+        """
         radius = (rule.number("radius") if rule else None) or of_file
         if radius is None and light.radius is not None:
-            radius = light.radius * self.unit
+            radius = light.radius * metres
             if not _LEAST_RADIUS <= radius <= _LARGEST_LAMP:
                 text = f"lamp of {radius:.3g} m radius; {LAMP_RADIUS} m is used"
                 self._note(light, Kind.INVALID, "lamp-radius", text)
@@ -176,7 +187,7 @@ class Interpreter:
         return radius
 
     def _with_lamp(
-        self, lamp: PhotometricLight, light: legacy.Light, rule: Rule | None
+        self, lamp: PhotometricLight, light: legacy.Light, rule: Rule | None, metres: float
     ) -> PhotometricLight:
         """What only a light with a place has: a cone, a focus, a size."""
         beam = _beam(light, rule)
@@ -186,7 +197,7 @@ class Interpreter:
             cutoff=beam.cutoff,
             softness=beam.softness,
             exponent=beam.exponent,
-            radius=self._radius(light, rule),
+            radius=self._radius(light, rule, metres),
         )
 
     def _note_lamp_type(self, light: legacy.Light, rule: Rule) -> None:

@@ -44,7 +44,7 @@ _APART = 1e-4
 _RANGES: dict[Type, tuple[float, float, float]] = {
     "A": (180.0, -90.0, 90.0),
     "B": (90.0, -180.0, 180.0),
-    "C": (360.0, 0.0, 180.0),
+    "C": (720.0, 0.0, 180.0),  # a turn may begin anywhere
 }
 
 
@@ -96,7 +96,9 @@ class Luminaire:
             return _from_zero(*_mirrored(planes, candela, 90.0))
         if ends == (0.0, 360.0):
             return planes, candela
-        return np.append(planes, 360.0), _joined(candela, candela[:1])
+        if planes[-1] < planes[0] + 360.0:
+            planes, candela = np.append(planes, planes[0] + 360.0), _joined(candela, candela[:1])
+        return _from_zero(planes, candela)
 
     def value(self, plane: npt.ArrayLike, angle: npt.ArrayLike) -> Doubles:
         """Candela in directions (degrees, any shape): linear in the angle, then in the plane."""
@@ -163,6 +165,7 @@ def checked(
         report.add(Kind.CLAMPED, "profile-negative", first, name, text)
         candela = np.where(negative, 0.0, candela)
     planes = _settled(at("planes", 0), type, planes)
+    _ascending(at, "planes", "plane angles", planes, -widest, widest)  # its ends have moved
     return Luminaire(name, type, planes, angles, candela, lumens, opening, keywords)
 
 
@@ -191,16 +194,19 @@ def _settled(place: SourceRef, type: Type, planes: Doubles) -> Doubles:
             raise InputError(place, f"1 horizontal angle; type {type} wants 2 or more")
         return planes
     first, last = float(planes[0]), float(planes[-1])
-    if len(planes) == 1 or (first, last) in ((0, 90), (0, 180), (90, 270), (-90, 90), (0, 360)):
+    if len(planes) == 1 or (first, last) in ((0, 90), (0, 180), (90, 270), (-90, 90)):
         return planes
-    # All round, the last plane before 360 left out as the first one again.
-    gap = float(np.diff(planes).max()) + _NEAR
-    if first == 0.0 and 180.0 < last < 360.0 and 360.0 - last <= gap:
+    # All round from any start, the first plane once more at the end or left out there.
+    gap = first + 360.0 - last
+    if abs(gap) <= _NEAR:
+        planes[-1] = first + 360.0
+        return planes
+    if 0.0 < gap < 180.0 and gap <= float(np.diff(planes).max()) + _NEAR:
         return planes
     raise InputError(
         place,
         f"planes: {first:g} to {last:g} degrees; want 0 alone, 0 to 90, 0 to 180, 90 to 270, "
-        "-90 to 90 or 0 to 360",
+        "-90 to 90 or a whole turn",
     )
 
 
@@ -219,6 +225,7 @@ def _mirrored(planes: Doubles, candela: Doubles, about: float) -> tuple[Doubles,
 def _from_zero(planes: Doubles, candela: Doubles) -> tuple[Doubles, Doubles]:
     """A whole turn of planes, first and last alike, as one from 0 to 360."""
     turned = np.mod(planes[:-1], 360.0)
+    turned[np.minimum(turned, 360.0 - turned) < _APART / 4.0] = 0.0
     order = np.argsort(turned)
     turned, candela = turned[order], candela[:-1][order]
     if turned[0] > 0.0:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import shorten
 from typing import Any, get_args
@@ -159,19 +159,25 @@ _COMPANIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "ambient": {"altitude": ("preset",), "azimuth": ("preset",)},
 }
 
-#: Keys of which a lamp that is placed has at least one.
-STRENGTHS = frozenset({"candela", "lumens", "illuminance", "watts", "radiant_watts", "ies"})
+#: Keys that say how strong a lamp with a place is, each row enough with all of its keys.
+_ENOUGH = (
+    ("candela",),
+    ("lumens",),
+    ("illuminance", "distance"),
+    ("watts", "lamp"),
+    ("watts", "efficacy"),
+    ("radiant_watts",),
+    ("ies",),
+)
 
 _COMPANIONS["lamp"] = {k: v for k, v in _COMPANIONS["light"].items() if k != "axis"} | {
     "offset": ("match",)
 }
 
 #: Of the keys in a row that say one thing the first that is there counts.
+_STRENGTHS = ("candela", "lumens", "illuminance", "watts", "radiant_watts")
 _RIVALS: dict[str, tuple[tuple[str, ...], ...]] = {
-    "light": (
-        ("candela", "lumens", "illuminance", "watts", "radiant_watts"),
-        ("sp_ratio", "illuminant"),
-    ),
+    "light": (_STRENGTHS, ("sp_ratio", "illuminant")),
     "material": (("luminance", "candela", "lumens"), ("roughness", "shininess")),
 }
 
@@ -182,7 +188,6 @@ _WITH_FILE = (
     ("lumens", "scale"),
     ("ies", "candela", "watts", "radiant_watts"),
     ("ies", "spread"),
-    ("sp_ratio", "illuminant"),
 )
 
 
@@ -213,9 +218,31 @@ def _note_company(
     for key, companions in _COMPANIONS.get(section, {}).items():
         if key in values and not any(companion in values for companion in companions):
             invalid(report, place, key, f"not used without {' or '.join(companions)}")
-    file = section in ("light", "lamp") and "ies" in values
-    for row in _WITH_FILE if file else _RIVALS.get(section, ()):
-        _note_rivals([key for key in row if _says(key, values)], place, report)
+    for row in _RIVALS.get(section, ()):
+        if row is not _STRENGTHS or "ies" not in values:
+            _note_rivals(row, values, place, report)
+
+
+def note_file_rivals(
+    values: Mapping[str, Any], used: bool, place: SourceRef, report: Report
+) -> None:
+    """The same beside ``ies``, once it is known whether its file can be used."""
+    for row in _WITH_FILE if used else (_STRENGTHS,):
+        _note_rivals(row, values, place, report)
+
+
+def is_strong(values: Iterable[str]) -> bool:
+    """Whether keys say how strong a lamp with a place is."""
+    return any(set(row) <= set(values) for row in _ENOUGH)
+
+
+def note_weak(place: SourceRef, report: Report) -> None:
+    """A finding: no database says how strong a placed lamp is, so there is nothing to guess from.
+
+    Whether its strength is not there or cannot be used.
+    """
+    wanted = ", ".join(" and ".join(row) for row in _ENOUGH)
+    invalid(report, place, "", f"no strength; not placed; want one of {wanted}")
 
 
 def _says(key: str, values: Mapping[str, Any]) -> bool:
@@ -227,7 +254,10 @@ def _says(key: str, values: Mapping[str, Any]) -> bool:
     return key in values and (key != "illuminance" or "distance" in values)
 
 
-def _note_rivals(there: Sequence[str], place: SourceRef, report: Report) -> None:
+def _note_rivals(
+    row: Sequence[str], values: Mapping[str, Any], place: SourceRef, report: Report
+) -> None:
+    there = [key for key in row if _says(key, values)]
     for key in there[1:]:
         text = f"{there[0]} beside it says the same and is used"
         report.add(Kind.INVALID, "sidecar-rival", place, key, text)

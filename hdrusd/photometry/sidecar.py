@@ -62,15 +62,19 @@ from hdrusd.photometry.light import Provenance
 from hdrusd.photometry.recipe_keys import (
     GAMMA,
     KEYS,
-    STRENGTHS,
     checked,
     fits,
     invalid,
+    is_strong,
+    note_weak,
     shown,
     unknown,
 )
 from hdrusd.photometry.scotopic_light import ILLUMINANTS
 from hdrusd.report import Kind, Report
+
+#: Why something of ``[source]`` is not used.
+STATED_ITSELF = "the source states its own, which is used"
 
 #: The name under which it is looked for beside the source.
 FILE_NAME = "photometry.toml"
@@ -159,6 +163,13 @@ class Sidecar:
     up: str | None = None  # "Y" or "Z", likewise
     light_unit: str = "nits"  # of a USD source: a name of photometry.light_unit.LIGHT_UNITS
     rules: list[Rule] = field(default_factory=list)
+    _passed_over: list[Unmatched] = field(default_factory=list)
+
+    def pass_over(self, key: str) -> None:
+        """A key of ``[source]`` is not used: the source says otherwise."""
+        assert self.path is not None
+        place = SourceRef(self.path, "source")
+        self._passed_over.append(Unmatched(place, key, STATED_ITSELF))
 
     def match(self, section: str, *names: str, path: str = "") -> Rule | None:
         """The first rule of a section whose pattern fits one of the names.
@@ -180,8 +191,8 @@ class Sidecar:
         return first
 
     def unmatched(self) -> list[Unmatched]:
-        """The patterns that matched nothing."""
-        return [
+        """The patterns that matched nothing, and what of ``[source]`` was passed over."""
+        return self._passed_over + [
             Unmatched(
                 rule.place,
                 rule.pattern,
@@ -253,9 +264,7 @@ def _read_section(sidecar: Sidecar, section: str, tables: Any, report: Report) -
         if "match" not in values and not (lamp and "at" in values):
             wanted = "places in at, or a node in match" if lamp else "a name or a pattern in match"
             invalid(report, place, "", f"nothing that it is for; want {wanted}")
-        elif lamp and not STRENGTHS & values.keys():
-            # No database says how strong it is, so there is nothing to estimate from.
-            wanted = ", ".join(sorted(STRENGTHS))
-            invalid(report, place, "", f"no strength; not placed; want one of {wanted}")
+        elif lamp and not is_strong(values):
+            note_weak(place, report)
         else:
             sidecar.rules.append(Rule(section, place, values))

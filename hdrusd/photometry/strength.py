@@ -16,7 +16,7 @@ from hdrusd.photometry.confidence import BY_LAMP_TYPE
 from hdrusd.photometry.light import Provenance
 from hdrusd.photometry.light_unit import LUMENS_PER_WATT
 from hdrusd.photometry.sidecar import Rule
-from hdrusd.photometry.spread import Beam, Spread, solid_angle
+from hdrusd.photometry.spread import OWN, Beam, solid_angle
 from hdrusd.report import Kind
 
 #: Share of a flux that may be missing without a word.
@@ -94,26 +94,27 @@ def _by_radiant_watts(rule: Rule, beam: Beam, note: Note) -> Stated | None:
     if watts is None:
         return None
     efficacy = rule.number("efficacy") or LUMENS_PER_WATT
-    value, how = _spread(watts * efficacy, rule, beam, "sphere", note)
+    value, how = _spread(watts * efficacy, rule, beam, OWN[beam.emitter], note)
     how = f"{watts:g} W at {efficacy:g} lm/W, {how}"
     return Stated(value, rule.provenance, f"{rule.place}, {how}", rule.source)
 
 
-def _usual(beam: Beam) -> Spread:
-    return "cone" if beam.shaped else "sphere"
+def _usual(beam: Beam) -> str:
+    return "cone" if beam.shaped else OWN[beam.emitter]
 
 
-def _spread(flux: float, rule: Rule, beam: Beam, usual: Spread, note: Note) -> tuple[float, str]:
+def _spread(flux: float, rule: Rule, beam: Beam, usual: str, note: Note) -> tuple[float, str]:
     """Candela of lumens, and how they came about."""
-    spread: Spread = rule.values.get("spread", usual)
+    spread: str = rule.values.get("spread", usual)
     angle = solid_angle(spread, beam)
     candela = flux / angle if angle > 0.0 else 0.0
     how = f"{flux:.6g} lm over {angle:.4g} sr ({spread})"
-    if "spread" not in rule.values:
+    if "spread" not in rule.values and (beam.shaped or beam.emitter == "ball"):
         text = f"{how} are {candela:.4g} cd on the axis; spread says otherwise"
         note(Kind.ASSUMED, "light-spread", text)
     elif spread == "cone" and not beam.shaped:
-        note(Kind.ASSUMED, "light-spread", "has no cone; its lumens go to all sides")
+        where = "to all sides" if beam.emitter == "ball" else "as its shape has them"
+        note(Kind.ASSUMED, "light-spread", f"has no cone; its lumens go {where}")
     passed = candela * solid_angle("cone", beam)
     if abs(passed - flux) > _SAME * flux:
         text = f"its cone and focus make {passed:.4g} lm of {flux:.6g} lm over {angle:.4g} sr"

@@ -23,10 +23,10 @@ _STEPS, _MOST = 8, 20_000
 _BRIGHT = 0.5
 
 
-def middle_of_glow(
+def box_of_glow(
     meshes: Sequence[Mesh], index: int, material: Material, picture: Picture
 ) -> Doubles | None:
-    """The middle of the box of what glows, (3,), in the meshes' space; None where nothing does.
+    """The box of what glows, (2, 3), in the meshes' space; None where nothing does.
 
     ``index``: of ``material`` in the scene.
     """
@@ -34,7 +34,7 @@ def middle_of_glow(
     if not found:
         return None
     points = np.concatenate(found)
-    return np.asarray(0.5 * (points.min(axis=0) + points.max(axis=0)))
+    return np.stack([points.min(axis=0), points.max(axis=0)])
 
 
 def _glowing(mesh: Mesh, index: int, material: Material, picture: Picture) -> Doubles:

@@ -16,7 +16,7 @@ from hdrusd.legacy.scene import Image
 from hdrusd.photometry.baked import OVERVIEW
 from hdrusd.photometry.reflectance import reflectance_table
 from hdrusd.recipe.evidence import leads
-from hdrusd.recipe.places import Doubles
+from hdrusd.recipe.places import Doubles, note_unseen
 from hdrusd.recipe.stage_scene import stage_scene
 from hdrusd.recipe.text import recipe
 from hdrusd.units import TEXTURE_GAMMA
@@ -47,8 +47,11 @@ def write_recipe(
     if source.suffix.lower() in STAGES:
         scene = stage_scene(source, resolver.allowed, report)
     else:
+        said = {"unit": source_unit, "up": up}
+        resolver.stated = frozenset(key for key, value in said.items() if value)
         scene = read(resolver, report)
     scene.unit_m, scene.up = source_unit or scene.unit_m, up or scene.up
+    note_unseen(scene, report)
     found = leads(scene, _picture)
     counted = sum(lead.counts for lead in found)
     text = recipe(source.name, found, unit_m=source_unit, up=up)

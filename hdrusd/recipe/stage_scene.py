@@ -6,7 +6,7 @@ and what UsdLux's letter says in nits counts as without a unit, for LDR stages r
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,15 +15,13 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from hdrusd.errors import SourceRef
 from hdrusd.legacy.scene import Image, LegacyScene, Light, Mesh, Node, Texture
+from hdrusd.recipe.places import REPEATS, count, note_left
 from hdrusd.report import Report
 from hdrusd.usd import light_overs, preview_overs
 from hdrusd.usd.lux import is_light, light_kind
 from hdrusd.usd.network import Findings
 from hdrusd.usd.network import Node as ShaderNode
 from hdrusd.usd.source_stage import open_source
-
-#: Prims that are looked at.
-_MOST = 200_000
 
 _KINDS = {"distant": "directional", "dome": "ambient"}
 
@@ -51,13 +49,9 @@ class _Reader:
         self._materials: dict[str, int | None] = {}
 
     def read(self) -> None:
-        """Every prim, instances opened, parents first."""
+        """Every prim, parents first; of prims in instances as many places as of nodes."""
         nodes: dict[str, Node] = {}
-        everything = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
-        prims = Usd.PrimRange(self.stage.GetPseudoRoot(), everything)
-        for prim, _ in zip(prims, range(_MOST), strict=False):
-            if prim.IsPseudoRoot():
-                continue
+        for prim in self._prims():
             here = replace(self.place, place=str(prim.GetPath()))
             node = Node(prim.GetName(), here, _matrix(prim))
             nodes[str(prim.GetPath())] = node
@@ -67,6 +61,28 @@ class _Reader:
                 self._light(prim, node)
             elif prim.IsA(UsdGeom.Mesh):
                 self._mesh(UsdGeom.Mesh(prim), node)
+
+    def _prims(self) -> Iterator[Usd.Prim]:
+        everything = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
+        prims = iter(Usd.PrimRange(self.stage.GetPseudoRoot(), everything))
+        next(prims)  # the pseudo-root
+        seen: set[Sdf.Path] = set()  # of prims in prototypes
+        repeats, cut = 0, False
+        for prim in prims:
+            if prim.IsInstanceProxy():
+                path = prim.GetPrimInPrototype().GetPath()
+                if path in seen:
+                    if repeats == REPEATS:
+                        prims.PruneChildren()
+                        cut = True
+                        continue
+                    repeats += 1
+                seen.add(path)
+            yield prim
+        if cut:
+            roots = self.stage.GetPseudoRoot().GetChildren()
+            distinct, everywhere = count(roots, _below, Usd.Prim.GetPath)
+            note_left(everywhere - distinct - REPEATS, self.place, self.report)
 
     def _light(self, prim: Usd.Prim, node: Node) -> None:
         kind = light_kind(prim)
@@ -117,6 +133,10 @@ class _Reader:
         read = preview_overs.read_source_surface(prim, surface, findings, named, emission_map=True)
         self.scene.materials.append(replace(read.material, emission_cd_m2=False))
         return len(self.scene.materials) - 1
+
+
+def _below(prim: Usd.Prim) -> list[Usd.Prim]:
+    return list((prim.GetPrototype() if prim.IsInstance() else prim).GetChildren())
 
 
 def _matrix(prim: Usd.Prim) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None:

@@ -12,7 +12,7 @@ from textwrap import wrap
 from hdrusd.errors import one_line
 from hdrusd.photometry.lamp_classes import LampClass
 from hdrusd.photometry.recipe_entry import quoted
-from hdrusd.recipe.evidence import Lead
+from hdrusd.recipe.lead import Lead
 
 _WIDTH = 96
 
@@ -21,8 +21,8 @@ Photometry of {name}: a first proposal, to be edited.
 
 What is known for sure, from a photometer, a data sheet or a plan, goes in place of these
 numbers, with provenance = "measured" or "authored" and its source. Entries that begin with #
-are suspicions; without the # they count. The first entry of a section that fits is used.
-Keys: docs/concept-mapping.md of hdrusd."""
+are suspicions; without the # they count. The first entry of a section that fits is used, but
+every [[lamp]] adds its lamps. Keys: docs/concept-mapping.md of hdrusd."""
 
 _SKY = """\
 A night without a moon; or moonlit, dusk, overcast-day, clear-sun, ... or illuminance = lx."""
@@ -48,7 +48,13 @@ def recipe(
 
 def _entry(lead: Lead) -> str:
     kind = lead.kind
-    rows = [f"[[{lead.section}]]", f"match = {quoted(lead.pattern)}"]
+    rows = [f"[[{lead.section}]]"]
+    if lead.pattern:
+        rows.append(f"match = {quoted(lead.pattern)}")
+    elif lead.at:
+        rows.append(f"at = {[list(point) for point in lead.at]}  # {lead.where}")
+    else:
+        return _comment(_why(lead))  # nothing that an entry could be for
     if lead.twin:
         rows.append("enabled = false")
     if lead.offset is not None:

@@ -25,9 +25,19 @@ def resolved_asset(attribute: Usd.Attribute, asset: Sdf.AssetPath) -> str:
     return str(asset.path)
 
 
+def in_package(path: str) -> bool:
+    """Whether a path leads into a package; a bracket in a file's name does not make it one."""
+    return bool(Ar.IsPackageRelativePath(path))
+
+
+def file_on_disk(path: str) -> Path:
+    """The file that a path leads to, or the package that it leads into."""
+    return Path(Ar.SplitPackageRelativePathOuter(path)[0])
+
+
 def asset_bytes(path: str) -> bytes | None:
     """The bytes of a file or of a file in a package; None when there is none."""
-    if "[" not in path:
+    if not in_package(path):
         file = Path(path)
         return file.read_bytes() if file.is_file() else None
     opened = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(path))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pxr import Usd
+from pxr import Sdf, Usd
 
 from hdrusd.errors import SourceRef
 from hdrusd.report import Kind, Report
@@ -15,7 +15,18 @@ def place_of(stage: Usd.Stage) -> SourceRef:
     return SourceRef(Path(stage.GetRootLayer().identifier))
 
 
+def first_place(prim: Usd.Prim) -> Sdf.Path:
+    """Its path; of what is in a prototype, whose name USD makes up, that in its first instance."""
+    path = prim.GetPath()
+    while prim.IsInPrototype():
+        while not prim.IsPrototype():
+            prim = prim.GetParent()
+        instance = min(prim.GetInstances(), key=Usd.Prim.GetPath)
+        path, prim = path.ReplacePrefix(prim.GetPath(), instance.GetPath()), instance
+    return path
+
+
 def prim_finding(report: Report, prim: Usd.Prim, kind: Kind, code: str, text: str) -> None:
     """Note a finding about a prim, or, at the pseudo-root, about the stage as a whole."""
-    thing = "" if prim.IsPseudoRoot() else str(prim.GetPath())
+    thing = "" if prim.IsPseudoRoot() else str(first_place(prim))
     report.add(kind, code, place_of(prim.GetStage()), thing, text)

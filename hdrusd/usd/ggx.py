@@ -12,6 +12,7 @@ from hdrusd.usd.network import Findings, Signal
 
 #: Inputs that are colours, by the fields of scene.Material; the others are shares.
 _COLORS = ("diffuse", "specular", "emission")
+_REFLECTANCES = ("diffuse", "specular")
 
 #: Reflectance at normal incidence of the clearcoat that shader 1 draws.
 CLEARCOAT_F0 = 0.04
@@ -42,6 +43,9 @@ def build_material(
             values[name] = findings.share(name, signal.value[0])
         if signal.use is not None:
             values[f"{name}_map"] = signal.use
+            if name in _REFLECTANCES and signal.use.leaves_shares():
+                text = f"{name}: its texture's scale and bias lead out of 0 to 1; held there"
+                findings.finding("value-range", text, Kind.CLAMPED)
         if signal.primvar and name not in ("diffuse", "opacity"):
             shown = ", ".join(f"{v:g}" for v in signal.value)
             findings.finding("node-unknown", f"{name}: primvar is not read; {shown} is used")

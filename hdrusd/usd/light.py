@@ -104,12 +104,15 @@ def write_legacy_falloff(
         _uniform(prim, "photometric:legacy:attenuation", _TYPES.Float3, value)
 
 
-def read_light(prim: Usd.Prim, *, scale: float = 1.0) -> PhotometricLight:
-    """Undo ``write_light``: the light as photometry means it."""
-    reading = read_lux(prim, world=_scaled(scale), meters_per_unit=1.0)
+def read_light(
+    prim: Usd.Prim, time: Usd.TimeCode | None = None, *, scale: float = 1.0
+) -> PhotometricLight:
+    """Undo ``write_light``: the light as photometry means it. ``time``: None is the default one."""
+    time = Usd.TimeCode.Default() if time is None else time
+    reading = read_lux(prim, time, world=_scaled(scale), meters_per_unit=1.0)
     if reading is None:
         raise ValueError(f"{prim.GetPath()} is no light")
-    strength, color = _photometric(prim, reading, Usd.TimeCode.Default())
+    strength, color = _photometric(prim, reading, time)
     shaping = UsdLux.ShapingAPI(prim)
     has_cone = prim.HasAPI(UsdLux.ShapingAPI)
     cutoff = float(shaping.GetShapingConeAngleAttr().Get()) if has_cone else 180.0
@@ -130,7 +133,7 @@ def read_light(prim: Usd.Prim, *, scale: float = 1.0) -> PhotometricLight:
         exponent=exponent,
         radius=reading.radius or 0.05,
         profile=photometric_file(prim),
-        sp=scotopic_ratio(prim, Usd.TimeCode.Default()) or 0.0,
+        sp=scotopic_ratio(prim, time) or 0.0,
         provenance=get("photometric:provenance") or "authored",  # type: ignore[arg-type]
         rule=get("photometric:rule"),
         source=get("photometric:source"),

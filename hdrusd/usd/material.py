@@ -44,6 +44,7 @@ class Surface:
     source_texture: str = ""
     emission: RGB = (0.0, 0.0, 0.0)  # cd/m2, at 1.0 of its map
     luminance: float = 0.0  # cd/m2
+    peak: bool = False  # ``emission`` is that of its map's brightest texel, not of full code
     emission_map: Map | None = None
     replaces_reflection: bool = False
     opacity_map: Map | None = None
@@ -51,17 +52,24 @@ class Surface:
     #: "normal", "occlusion", "metallic", "roughness", "clearcoat", "clearcoat_roughness".
     data_maps: Mapping[str, Map] = field(default_factory=dict)
     vertex_color: str = ""
+    vertex_opacity: str = ""
     provenance: str = ""
     rule: str = ""
     source: str = ""
 
 
 def write_look(
-    stage: Usd.Stage, path: Sdf.Path, material: Material, maps: dict[str, Map], vertex_color: str
+    stage: Usd.Stage,
+    path: Sdf.Path,
+    material: Material,
+    maps: dict[str, Map],
+    vertex_color: str,
+    vertex_opacity: str = "",
 ) -> None:
     """The legacy look as UsdPreviewSurface; ``maps`` by "diffuse", "normal": as the fields.
 
-    A picture without a map is missing, refused or broken: the reference stays in the extras.
+    ``vertex_color``, ``vertex_opacity``: primvars that it reads, or nothing. A picture without a
+    map is missing, refused or broken: the reference stays in the extras.
     """
     network = _Network(stage, path, "Look")
     network.color("diffuseColor", material.diffuse, maps.get("diffuse"), vertex_color)
@@ -74,7 +82,7 @@ def write_look(
         if name.removesuffix("_map") not in maps
     }
     keep_extras(prim, {**material.extras, **lost})
-    _write_common(network, material, material.specular, maps)
+    _write_common(network, material, material.specular, maps, vertex_opacity)
 
 
 def write_photometric(
@@ -93,7 +101,8 @@ def write_photometric(
     for role, used in (("opacity", surface.opacity_map), ("specular", surface.specular_map)):
         if used is not None:
             maps[role] = used
-    _write_common(network, material, specular, maps, dark=surface.replaces_reflection)
+    dark = surface.replaces_reflection
+    _write_common(network, material, specular, maps, surface.vertex_opacity, dark=dark)
     prim = network.material.GetPrim()
     prim.ApplyAPI(_API)
     types = Sdf.ValueTypeNames
@@ -138,6 +147,7 @@ def _write_common(
     material: Material,
     specular: RGB,
     maps: Mapping[str, Map],
+    vertex_opacity: str,
     *,
     dark: bool = False,
 ) -> None:
@@ -170,6 +180,8 @@ def _write_common(
         network.scalar("opacity", maps["opacity"], material.alpha)
     else:
         network.number("opacity", material.alpha)
+        if vertex_opacity:
+            network.primvar("opacity", vertex_opacity, "float", material.alpha)
     if material.alpha_mode == "mask":
         network.number("opacityThreshold", material.alpha_cutoff)
     else:  # what blends fades whole, highlight and glow with it: OpenGL's and glTF's alpha
@@ -194,11 +206,15 @@ class _Network:
         if used is not None:
             port.ConnectToSource(self._texture(name, used, (*used.scale, 1.0)), "rgb")
         elif primvar:
-            reader = self._node(f"{name}_primvar", "UsdPrimvarReader_float3")
-            reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set(primvar)
-            reader.CreateInput("fallback", Sdf.ValueTypeNames.Float3).Set(Gf.Vec3f(*value))
-            reader.CreateOutput("result", Sdf.ValueTypeNames.Float3)
-            port.ConnectToSource(reader.ConnectableAPI(), "result")
+            self.primvar(name, primvar, "float3", Gf.Vec3f(*value))
+
+    def primvar(self, name: str, primvar: str, kind: str, absent: object) -> None:
+        """What a mesh says of an input; ``absent`` where it says nothing."""
+        reader = self._node(f"{name}_primvar", f"UsdPrimvarReader_{kind}")
+        reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set(primvar)
+        reader.CreateInput("fallback", Sdf.ValueTypeNames.Find(kind)).Set(absent)
+        reader.CreateOutput("result", Sdf.ValueTypeNames.Find(kind))
+        self.surface.GetInput(name).ConnectToSource(reader.ConnectableAPI(), "result")
 
     def number(
         self, name: str, value: float, kind: Sdf.ValueTypeName = Sdf.ValueTypeNames.Float
@@ -266,7 +282,9 @@ class _Network:
         return node
 
     def _node(self, name: str, kind: str) -> UsdShade.Shader:
-        node = UsdShade.Shader.Define(self.stage, self.path.AppendChild(name))
+        # Beside the surface: a shader may not hold others, only a material or a node graph.
+        beside = self.path.GetParentPath().AppendChild(f"{self.path.name}_{name}")
+        node = UsdShade.Shader.Define(self.stage, beside)
         node.CreateIdAttr(kind)
         return node
 

@@ -22,6 +22,7 @@ Floats = npt.NDArray[np.float32]
 
 #: Primvar of vertex colours in the stages that we write.
 COLOR_PRIMVAR = "displayColor"
+OPACITY_PRIMVAR = "displayOpacity"
 
 
 def write_mesh(prim: Sdf.PrimSpec, mesh: Mesh) -> None:
@@ -54,7 +55,7 @@ def write_mesh(prim: Sdf.PrimSpec, mesh: Mesh) -> None:
         primvar(prim, f"primvars:{COLOR_PRIMVAR}", types.Color3fArray, color, way)
         if float(mesh.colors[:, 3].min(initial=1.0)) < 1.0:
             opacity = Vt.FloatArray.FromNumpy(np.ascontiguousarray(mesh.colors[:, 3]))
-            primvar(prim, "primvars:displayOpacity", types.FloatArray, opacity, way)
+            primvar(prim, f"primvars:{OPACITY_PRIMVAR}", types.FloatArray, opacity, way)
 
 
 def topology_varies(prim: Usd.Prim) -> bool:

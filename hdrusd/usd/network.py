@@ -19,6 +19,7 @@ from hdrusd.errors import SourceRef
 from hdrusd.report import Kind, Report
 from hdrusd.scene import TextureUse
 from hdrusd.usd.assets import resolved_asset
+from hdrusd.usd.findings import first_place
 from hdrusd.usd.lux import connection_end
 
 Values = tuple[float, ...]
@@ -164,7 +165,7 @@ class Findings:
 
     def finding(self, code: str, text: str, kind: Kind = Kind.DROPPED) -> None:
         """A finding about the material."""
-        self.report.add(kind, code, self.place, str(self.prim.GetPath()), text)
+        self.report.add(kind, code, self.place, str(first_place(self.prim)), text)
 
     def numbers(self, node: Node, name: str, default: Values) -> Values:
         """Finite numbers; the default where a layer gives the input something else."""

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from pxr import Sdf, Tf, Usd, UsdUtils
+from pxr import Sdf, Tf, Usd, UsdShade, UsdUtils
 
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.input_file import check_input
@@ -60,7 +60,17 @@ def usd_warnings(path: Path, report: Report | None) -> Iterator[None]:
         yield
     finally:
         for said in delegate.TakeUncoalescedDiagnostics():
-            report.add(Kind.INVALID, "usd-warning", SourceRef(path), "", _warning(said.commentary))
+            if not _names_tiles(said.commentary):
+                text = _warning(said.commentary)
+                report.add(Kind.INVALID, "usd-warning", SourceRef(path), "", text)
+
+
+def _names_tiles(text: str) -> bool:
+    """Whether USD misses a file by a UDIM name, which none has, though its tiles are there."""
+    found = re.search(r"@([^@]*<UDIM>[^@]*)@ found in layer @([^@]*)@", text)
+    if found is None or (layer := Sdf.Layer.Find(found[2])) is None:
+        return False
+    return bool(UsdShade.UdimUtils.ResolveUdimPath(found[1], layer))
 
 
 def open_layer(path: Path) -> Sdf.Layer:

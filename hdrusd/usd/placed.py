@@ -8,25 +8,25 @@ import numpy as np
 from pxr import Gf, Usd, UsdGeom
 
 from hdrusd.usd.fixtures import PlacedMesh
+from hdrusd.usd.placed_area import PlacedArea, place_kinds, placed_areas
 from hdrusd.usd.sharing import Copies
 
 
-def area_scales(stage: Usd.Stage, placed: Iterable[PlacedMesh], copies: Copies) -> dict[int, float]:
-    """m2 a square unit of each mesh, summed over all its visible places, at the first time.
-
-    The square of the cube root of the volume's scale: exact where a scale is even.
-    """
+def mesh_areas(
+    stage: Usd.Stage, placed: Iterable[PlacedMesh], copies: Copies
+) -> dict[int, PlacedArea]:
+    """What all visible places of each mesh make of its areas, at the first time."""
     time, unit = Usd.TimeCode.EarliestTime(), UsdGeom.GetStageMetersPerUnit(stage)
     cache = UsdGeom.XformCache(time)
-    found: dict[int, float] = {}
+    meshes: list[int] = []
+    worlds: list[Gf.Matrix4d] = []
     places = ((one.mesh, path) for one in placed for path in copies.places(one.path))
     for mesh, path in places:
         prim = stage.GetPrimAtPath(path)
-        hidden = UsdGeom.Imageable(prim).ComputeVisibility(time) == UsdGeom.Tokens.invisible
-        volume = abs(cache.GetLocalToWorldTransform(prim).GetDeterminant3())
-        scale = 0.0 if hidden else (float(np.cbrt(volume)) * unit) ** 2
-        found[mesh] = found.get(mesh, 0.0) + scale
-    return found
+        if UsdGeom.Imageable(prim).ComputeVisibility(time) != UsdGeom.Tokens.invisible:
+            meshes.append(mesh)
+            worlds.append(cache.GetLocalToWorldTransform(prim))
+    return placed_areas(place_kinds(worlds, unit), meshes)
 
 
 def extents(stage: Usd.Stage) -> tuple[float, float]:
@@ -42,6 +42,14 @@ def extents(stage: Usd.Stage) -> tuple[float, float]:
     up = 1 if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.y else 2
     ground = float(np.prod([size[axis] for axis in range(3) if axis != up]))
     return float(box.GetSize().GetLength()) * unit, ground
+
+
+def is_shown(prim: Usd.Prim) -> bool:
+    """Whether something is on the stage and visible, at the first time."""
+    if not prim or not prim.IsActive():
+        return False
+    visibility = UsdGeom.Imageable(prim).ComputeVisibility(Usd.TimeCode.EarliestTime())
+    return bool(visibility != UsdGeom.Tokens.invisible)
 
 
 def level_share(lights: Sequence[Usd.Prim]) -> float:

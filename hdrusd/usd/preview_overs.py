@@ -22,7 +22,7 @@ from hdrusd.usd.textures import UDIM
 API = "HdrusdPhotometricMaterialAPI"
 
 #: Inputs of a UsdUVTexture that a node in its place takes over.
-_TEXTURE_INPUTS = ("st", "wrapS", "wrapT", "fallback", "bias")
+_TEXTURE_INPUTS = ("st", "wrapS", "wrapT", "fallback")
 
 _TYPES = Sdf.ValueTypeNames
 _BLACK, _WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
@@ -232,6 +232,8 @@ def _color(
         why = f"{name}: {file} has tiles, which are read by T^2.2 as they are"
     elif varies:
         why = f"{name}: the picture changes in time"
+    elif any(findings.numbers(node, "bias", (0.0, 0.0, 0.0, 0.0))[:3]):
+        why = f"{name}: the picture has a bias, and T^2.2 D has none"
     if why:
         fixed.add(name)
         _kept(findings, why)

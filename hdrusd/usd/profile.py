@@ -34,7 +34,7 @@ from hdrusd.photometry.luminaire import MOST_BYTES, Luminaire
 from hdrusd.photometry.profile import MOST_CELLS, cell_count, even_profile
 from hdrusd.report import Kind, Report
 from hdrusd.scene import Profile
-from hdrusd.usd.assets import asset_bytes, resolved_asset
+from hdrusd.usd.assets import asset_bytes, in_package, resolved_asset
 from hdrusd.usd.findings import prim_finding
 from hdrusd.usd.lux import input_number, input_source
 
@@ -161,8 +161,9 @@ def read_luminaire(data: bytes, path: str, report: Report) -> Luminaire:
 def beside(path: str, name: str) -> str:
     """The path of a file in the folder of another, which may lie in a package."""
     name = PurePosixPath(name.replace("\\", "/")).name.rstrip("]")
-    folder = path[: max(path.rfind("/"), path.rfind("[")) + 1]
-    return folder + name + ("]" if path.endswith("]") else "")
+    if not in_package(path):
+        return path[: path.rfind("/") + 1] + name
+    return path[: max(path.rfind("/"), path.rfind("[")) + 1] + name + "]"
 
 
 def scaled(profile: Profile, scale: float) -> Profile:
@@ -176,8 +177,9 @@ def scaled(profile: Profile, scale: float) -> Profile:
 
 def _bytes(path: str) -> bytes:
     """Raises OSError where there is nothing, InputError for too much."""
-    if "[" not in path and Path(path).is_file() and Path(path).stat().st_size > MOST_BYTES:
-        raise InputError(Path(path), f"want at most {MOST_BYTES} bytes")
+    file = Path(path)
+    if not in_package(path) and file.is_file() and file.stat().st_size > MOST_BYTES:
+        raise InputError(file, f"want at most {MOST_BYTES} bytes")
     data = asset_bytes(path)
     if data is None:
         raise FileNotFoundError(2, "no such file", path)

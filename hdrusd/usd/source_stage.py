@@ -19,6 +19,7 @@ from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdUtils
 
 from hdrusd.errors import InputError, SourceRef
 from hdrusd.report import Kind, Report
+from hdrusd.usd.assets import file_on_disk
 from hdrusd.usd.opening import open_layer, usd_warnings
 
 #: Suffixes of the sources that are stages already.
@@ -29,9 +30,6 @@ _OF_THE_LAYER = frozenset(
     {"subLayers", "subLayerOffsets", "layerRelocates", "comment", "documentation"}
     | {"primChildren", "primOrder", "owner", "sessionOwner", "hasOwnedSubLayers"}
 )
-
-#: A path inside a package: "car.usdz[textures/a.png]".
-_PACKAGE = "["
 
 
 def open_source(path: Path, allowed: Callable[[Path], bool], report: Report) -> Usd.Stage:
@@ -54,7 +52,7 @@ def open_source(path: Path, allowed: Callable[[Path], bool], report: Report) -> 
         late = [x.identifier for x in stage.GetUsedLayers() if not _inside(x, allowed)]
         stage.MuteAndUnmuteLayers(late, [])
     for identifier in (*refused, *sorted(late)):
-        folder = _file(Sdf.Layer.SplitIdentifier(identifier)[0]).parent
+        folder = file_on_disk(Sdf.Layer.SplitIdentifier(identifier)[0]).parent
         text = f"{identifier}: outside the declared roots; not converted; --root {folder} would "
         text += "allow it"
         report.add(Kind.MISSING, "file-refused", SourceRef(path), "layer", text)
@@ -93,11 +91,11 @@ def copy_time_metadata(source: Sdf.Layer, target: Sdf.Layer) -> None:
 def files_of(stage: Usd.Stage) -> list[Path]:
     """The files of all layers that a stage is made of, packages once."""
     layers = (layer for layer in stage.GetUsedLayers() if not layer.anonymous)
-    return sorted({_file(layer.realPath or layer.identifier) for layer in layers})
+    return sorted({file_on_disk(layer.realPath or layer.identifier) for layer in layers})
 
 
 def _inside(layer: Sdf.Layer, allowed: Callable[[Path], bool]) -> bool:
-    return layer.anonymous or allowed(_file(layer.realPath or layer.identifier))
+    return layer.anonymous or allowed(file_on_disk(layer.realPath or layer.identifier))
 
 
 def _outside(layer: Sdf.Layer, allowed: Callable[[Path], bool]) -> list[str]:
@@ -117,7 +115,7 @@ def _outside(layer: Sdf.Layer, allowed: Callable[[Path], bool]) -> list[str]:
             resolved = str(Ar.GetResolver().Resolve(location))
             if not resolved:
                 continue  # USD says so
-            if not allowed(_file(resolved)):
+            if not allowed(file_on_disk(resolved)):
                 refused.append(identifier)
                 continue
             with contextlib.suppress(Tf.ErrorException):  # USD says so where it is used
@@ -133,7 +131,7 @@ def _named_layers(layer: Sdf.Layer, variables: Mapping[str, Any]) -> Iterator[st
     ``variables``: values for its expressions.
     """
     _, everything, _ = UsdUtils.ExtractExternalReferences(layer.identifier)
-    inmost = {asset: asset.rstrip("]").rpartition(_PACKAGE)[2] for asset in everything}
+    inmost = {asset: Ar.SplitPackageRelativePathInner(asset)[1] or asset for asset in everything}
     clips = [asset for asset, name in inmost.items() if Path(name).suffix.lower() in STAGES]
     for asset in sorted({*layer.GetCompositionAssetDependencies(), *clips}):
         if Sdf.VariableExpression.IsExpression(asset):
@@ -154,7 +152,3 @@ def _stand_in(path: Path, identifier: str) -> Sdf.Layer:
     except Tf.ErrorException as problem:  # within a package, or with arguments for its format
         text = f"{identifier}: outside the declared roots; want it inside, or --root"
         raise InputError(path, text) from problem
-
-
-def _file(path: str) -> Path:
-    return Path(path.split(_PACKAGE)[0])

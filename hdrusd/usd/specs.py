@@ -65,6 +65,9 @@ def bind_faces(mesh: Sdf.PrimSpec, name: str, faces: Vt.IntArray, material: Sdf.
     attribute(subset, "indices", types.IntArray, faces)
     attribute(subset, "familyName", types.Token, "materialBind", uniform=True)
     bind(subset, material)
+    family = "subsetFamily:materialBind:familyType"
+    if family not in mesh.attributes:
+        attribute(mesh, family, types.Token, "nonOverlapping", uniform=True)
 
 
 def apply(prim: Sdf.PrimSpec, *schemas: str) -> None:

@@ -12,7 +12,7 @@ from hdrusd.errors import InputError, SourceRef
 from hdrusd.images import MAX_PIXELS, read_image
 from hdrusd.report import Kind, Report
 from hdrusd.scene import ImageData, TextureRef
-from hdrusd.usd.assets import asset_bytes
+from hdrusd.usd.assets import asset_bytes, in_package
 
 #: What stands for a tile's number in a file's name.
 UDIM = "<UDIM>"
@@ -60,8 +60,10 @@ class TextureLoader:
             self.report.add(kind, code, self.place, name, text)
 
     def _read(self, file: str) -> ImageData:
-        inside = asset_bytes(file) if "[" in file else None
+        inside = asset_bytes(file) if in_package(file) else None
         image = read_image(Path(file), inside)
+        if image.dropped:
+            self._note(Kind.DROPPED, "image-channels", file, image.dropped)
         if image.pixels.dtype.kind == "f" and not np.isfinite(image.pixels).all():
             self._note(Kind.INVALID, "texture-not-finite", file, "not finite in places; 0 there")
             pixels = np.nan_to_num(image.pixels, nan=0.0, posinf=0.0, neginf=0.0)
@@ -143,4 +145,4 @@ def texture_size(ref: TextureRef, image: ImageData) -> tuple[int, int]:
 
 
 def _exists(name: str) -> bool:
-    return asset_bytes(name) is not None if "[" in name else Path(name).is_file()
+    return asset_bytes(name) is not None if in_package(name) else Path(name).is_file()

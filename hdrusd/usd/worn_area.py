@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Gf, Sdf, Usd, UsdGeom
 
 from hdrusd.legacy.scene import LegacyScene, Mesh
 from hdrusd.photometry.lamp_area import LampArea, mean_area
 from hdrusd.usd.fixtures import PlacedMesh
+from hdrusd.usd.placed_area import place_kinds
 from hdrusd.usd.sharing import Copies
 from hdrusd.usd.triangles import corners
 
@@ -49,19 +50,22 @@ class LampAreas:
         """
         meshes = self.wearers.get(material, ())
         faces = {index: _faces(self.scene.meshes[index], material) for index in meshes}
+        numbers = sorted(place for index in meshes for place in self._places.get(index, ()))
+        worn = [self.placed[number] for number in numbers if len(faces[self.placed[number].mesh])]
+        kinds = place_kinds([self._world(self.copies.first(one.node)) for one in worn], self._unit)
+        alike: dict[tuple[int, int], LampArea] = {}
         lamps: list[LampArea] = []
-        for number in sorted(place for index in meshes for place in self._places.get(index, ())):
-            mesh = self.placed[number]
-            if len(faces[mesh.mesh]):
-                world = self._world(self.copies.first(mesh.node))
+        for one, kind, factor in zip(worn, kinds.kind.tolist(), kinds.factor.tolist(), strict=True):
+            key = one.mesh, kind
+            if key not in alike:
                 with np.errstate(all="ignore"):
-                    own = faces[mesh.mesh] @ _cofactors(world) * self._unit**2
-                    lamps.append(LampArea.of(own))
+                    alike[key] = LampArea.of(faces[one.mesh] @ kinds.cofactors[kind])
+            lamp = alike[key]
+            lamps.append(LampArea(lamp.seen * factor, lamp.surface * factor))
         return mean_area(lamps)
 
-    def _world(self, path: Sdf.Path) -> Doubles:
-        matrix = self._cache.GetLocalToWorldTransform(self.stage.GetPrimAtPath(path))
-        return np.array(matrix, np.float64)[:3, :3]
+    def _world(self, path: Sdf.Path) -> Gf.Matrix4d:
+        return self._cache.GetLocalToWorldTransform(self.stage.GetPrimAtPath(path))
 
 
 def _faces(mesh: Mesh, material: int) -> Doubles:
@@ -72,9 +76,3 @@ def _faces(mesh: Mesh, material: int) -> Doubles:
     triangles = corners(mesh.face_counts, mesh.face_indices, left_handed=False).select(wears)
     a, b, c = np.moveaxis(mesh.points[triangles.vertex].astype(np.float64), 1, 0)
     return np.asarray(0.5 * np.cross(b - a, c - a))
-
-
-def _cofactors(matrix: Doubles) -> Doubles:
-    """What area vectors (row vectors) are multiplied by where points are by ``matrix``."""
-    x, y, z = matrix
-    return np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])

@@ -8,7 +8,7 @@ street.geometry.usdc     nodes, meshes, cameras, bindings, animation
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -83,6 +83,7 @@ class StageWriter:
         self.names = Names({top: {"Render": 1, PROTOTYPES.name: 1}})
         self.places: list[Place] = []
         self.meshes: list[PlacedMesh] = []
+        self._worlds: dict[Sdf.Path, _World] = {}  # of nodes with lights, in their first places
         self.first_camera: str | None = None
         root = new_layer(folder / f"{stem}.usda")
         self.layers = {
@@ -168,34 +169,44 @@ class StageWriter:
         """A free path at a node for a light, whether it is written or not."""
         return self.names.child(place.path, source.name)
 
+    def metres_at(self, places: Iterable[Place]) -> list[float]:
+        """What a unit of the space of each node measures in the world, on the mean of all ways.
+
+        Of a node in several places in the first.
+        """
+        worlds = self._spaces([place.path for place in places])
+        return [world.scale * self.meters_per_unit for world in worlds]
+
+    def _spaces(self, nodes: Sequence[Sdf.Path]) -> list[_World]:
+        # What is animated has no value at the default time.
+        cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
+        for node in nodes:
+            if node not in self._worlds:
+                # What is in a prototype is in the world where that stands.
+                first = self.stage.GetPrimAtPath(self.tree.copies.first(node))
+                matrix = cache.GetLocalToWorldTransform(first)
+                self._worlds[node] = _World(matrix, *uniform_scale(matrix))
+        return [self._worlds[node] for node in nodes]
+
     def write_lights(self, lights: Sequence[LightAt]) -> list[Usd.Prim]:
         """Lights at their nodes, into the photometry layer; of a string the PointInstancer."""
         self._edit("photometry")
         layer = self.layers["photometry"]
         paths = [each.path or self.light_path(each.place, each.source) for each in lights]
-        # What is animated has no value at the default time.
-        cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
-        worlds: dict[Sdf.Path, _World] = {}
+        worlds = self._spaces([each.place.path for each in lights])
         with Sdf.ChangeBlock():
-            for path, each in zip(paths, lights, strict=True):
-                node, source = each.place.path, each.source
-                if node not in worlds:
-                    # What is in a prototype is in the world where that stands.
-                    first = self.stage.GetPrimAtPath(self.tree.copies.first(node))
-                    matrix = cache.GetLocalToWorldTransform(first)
-                    worlds[node] = _World(matrix, *uniform_scale(matrix))
+            for path, each, world in zip(paths, lights, worlds, strict=True):
+                source = each.source
                 if source.positions is None:
                     prim = specs.define(layer, path, light_type(each.light))
-                    world = worlds[node]
                     unit = (world.scale if world.even else 1.0) * self.meters_per_unit
                     write_light_spec(prim, each.light, scale=unit)
                     self._place_light(prim, each, world)
                 else:
                     prim = specs.define(layer, path, "PointInstancer")
                 self._keep_source(prim, source)
-        for path, each in zip(paths, lights, strict=True):
+        for path, each, world in zip(paths, lights, worlds, strict=True):
             if each.source.positions is not None:
-                world = worlds[each.place.path]
                 string = (each.source, each.light, world.matrix, self.meters_per_unit, each.right)
                 write_light_string(self.stage, path, *string)
         return [self.stage.GetPrimAtPath(path) for path in paths]

@@ -174,7 +174,7 @@ def bench_convert(database: Path, folder: Path) -> list[str]:
     texture = Texture(Image("picture.png", place, path=picture))
 
     def file_to_file() -> None:
-        MapWriter(folder / "maps", "maps", Report()).reflectance(
+        MapWriter(folder / "maps", "maps", folder, Report()).reflectance(
             texture, (0.8, 0.8, 0.8), 2.2, place, "paint"
         )
 

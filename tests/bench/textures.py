@@ -143,7 +143,7 @@ def bench_folder(count: int, side: int, runs: int, folder: Path) -> list[str]:
         return Path(tempfile.mkdtemp(dir=folder))
 
     def ours(*, looks: bool) -> None:
-        maps = MapWriter(fresh(), "maps", Report())
+        maps = MapWriter(fresh(), "maps", folder, Report())
         with maps.threaded(texture.image for texture in textures):
             for texture in textures:
                 maps.reflectance(texture, COLOR, 2.2, place, "paint")

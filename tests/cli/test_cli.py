@@ -252,3 +252,12 @@ def test_interrupt_inside_an_import_comes_after_it(tmp_path: Path, name: str) ->
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     assert (job.returncode, job.stdout, job.stderr.strip()) == (130, "", "interrupted")
+
+
+@pytest.mark.parametrize("name", ["", "-"])
+def test_what_is_no_name_of_a_file_is_wrong_use(hdrusd: CommandLine, name: str) -> None:
+    for arguments in (
+        ("convert", name, "a.usda"),
+        ("convert", "a.obj", "a.usda", "--report", name),
+    ):
+        assert f"{name!r} is no name of a file" in hdrusd.refused(*arguments, code=2)

@@ -141,6 +141,12 @@ def test_luminance_of_the_opening() -> None:
     assert nadir_luminance(ldt(ldt_text())) == pytest.approx(400.0 / (0.5 * 0.25))
 
 
+def test_the_output_ratio_is_that_of_all_lamps() -> None:
+    code = flux_code(ies(ies_text(lamps=2, lumens=1000.0)))
+    assert code is not None
+    assert code[4] == pytest.approx(ies(ies_text()).flux() / 20.0, rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("planes", "values", "stated", "found"),
     [

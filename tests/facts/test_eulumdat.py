@@ -58,6 +58,43 @@ def test_planes_without_symmetry_go_all_round(planes: Sequence[float]) -> None:
     assert lamp.value(between, 30.0) == pytest.approx((rows[-1][0] + rows[0][0]) / 2.0)
 
 
+def turned(planes: Sequence[float]) -> list[list[float]]:
+    return [[200 + 50 * math.cos(math.radians(c - 30.0))] * len(GAMMA) for c in planes]
+
+
+@pytest.mark.parametrize("start", [5, 15, -180])
+def test_a_turn_without_symmetry_begins_anywhere(start: int) -> None:
+    planes = range(start, start + 360, 15)
+    lamp = ldt(ldt_text(turned(planes), symmetry=0, planes=planes))
+    assert lamp.value(planes, 30.0) == pytest.approx([row[0] for row in turned(planes)])
+    ends = turned((start - 15, start))
+    assert lamp.value(start - 7.5, 30.0) == pytest.approx((ends[0][0] + ends[1][0]) / 2.0)
+
+
+@pytest.mark.parametrize(
+    ("symmetry", "planes"),
+    [
+        (2, range(0, 361, 45)),  # 360 is 0 again
+        (4, range(0, 361, 45)),
+        (2, range(0, 181, 45)),  # those that are stored, alone
+        (4, range(0, 91, 45)),
+        (2, range(0, 181, 60)),  # an even number of them
+        (3, range(-90, 91, 45)),
+        (3, range(90, 271, 45)),
+    ],
+)
+def test_planes_listed_otherwise_mean_the_same(symmetry: int, planes: range) -> None:
+    of = CASES[symmetry][1]
+    # The last plane that is stored, whatever the list has.
+    last = {2: 180, 3: planes[-1], 4: 90}[symmetry]
+    rows = [[of(math.radians(c))] * len(GAMMA) for c in planes if c <= last]
+    report = Report()
+    lamp = ldt(ldt_text(rows, symmetry=symmetry, planes=planes), report)
+    assert report.codes() == set()
+    for c in range(0, 360, planes.step):
+        assert lamp.value(c, 30.0) == pytest.approx(of(math.radians(c)), rel=1e-9), c
+
+
 @pytest.mark.parametrize(
     ("symmetry", "wanted"),
     [
@@ -122,6 +159,7 @@ def changed(line: int, value: str) -> str:
         (changed(29, "0"), "want more than 0"),
         (changed(29, "inf"), "lamp.ldt:29: luminous flux: 'inf' is no number"),
         (changed(45, "46"), "C planes 0 to 46"),
+        (ldt_text(symmetry=3, planes=range(0, 361, 15)), "25 C planes; symmetry 3"),
         (changed(46, "abc"), "lamp.ldt:46: C planes: 'abc' is no number"),
         (changed(52, "-30"), "want 0 to 180"),
         (changed(60, "1_0"), "is no number"),

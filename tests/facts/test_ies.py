@@ -9,7 +9,7 @@ import pytest
 from photometric_files import GAMMA, IES, QUADRANT, ies, ies_text
 
 from hdrusd.errors import InputError
-from hdrusd.photometry.ies import is_ies, read_ies, with_tilt
+from hdrusd.photometry.ies import is_ies, parse_ies, read_ies, with_tilt, write_ies
 from hdrusd.photometry.luminaire import Opening
 from hdrusd.report import Report
 
@@ -60,6 +60,39 @@ def test_the_photometric_factor_is_that_of_1986_and_1991(label: str, factor: flo
     assert report.codes() == (set() if label and "2031" not in label else {"profile-edition"})
 
 
+@pytest.mark.parametrize("before", ["\ufeff", "\n", " \r\n\r\n", "\ufeff\n"])
+@pytest.mark.parametrize("label", ["IESNA:LM-63-1995", "IESNA:LM-63-2002", "IES:LM-63-2019"])
+def test_the_label_is_the_first_line_that_says_something(before: str, label: str) -> None:
+    report = Report()
+    text = before + ies_text(label=label, ballast=0.9, photometric=0.8)
+    file = parse_ies(text.encode("utf-8"), IES, report)
+    assert file.edition == int(f"20{label[-2:]}") - 100 * label.endswith("95")
+    assert file.factor == pytest.approx(0.9, rel=1e-15)
+    assert report.codes() == set()
+
+
+def test_all_lamps_count_and_absolute_photometry_has_none() -> None:
+    for lamps, lumens, wanted in ((2, 3000.0, 6000.0), (1, 3000.0, 3000.0), (3, -1.0, None)):
+        assert ies(ies_text(lamps=lamps, lumens=lumens)).lumens == wanted
+    for lamps, lumens in ((0, 3000.0), (-1, -1.0), (-2, 3000.0), (2, 0.0)):
+        assert ies(ies_text(lamps=lamps, lumens=lumens)).lumens is None
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1"])
+def test_letters_of_either_encoding(encoding: str) -> None:
+    data = ies_text(keywords="[MANUFAC] Straßenlicht München").encode(encoding)
+    file = parse_ies(data, IES, Report())
+    assert file.keywords == {"MANUFAC": "Straßenlicht München"}
+    again = write_ies(file)
+    assert "Straßenlicht München".encode("latin-1") in again
+    assert parse_ies(again, IES, Report()).keywords == file.keywords
+
+
+def test_an_ellipsis_of_windows_ends_no_line() -> None:
+    data = ies_text(keywords="[TEST] one\x85 two").encode("latin-1")
+    assert parse_ies(data, IES, Report()).keywords == {"TEST": "one\x85 two"}
+
+
 def test_keywords_go_on() -> None:
     text = ies_text(keywords="[TEST] 12\n[OTHER]  first\n[MORE] second\n[_OWN] x\nno keyword")
     found = ies(text).keywords
@@ -74,6 +107,42 @@ def test_numbers_stand_anywhere(end: str) -> None:
     lamp = ies((head + "TILT=NONE\n" + spread).replace("\n", end), report)
     assert lamp.value(45, 60) == pytest.approx(500 / 3)
     assert not report.codes()
+
+
+def with_commas(text: str) -> str:
+    """All numbers below TILT=NONE with a decimal comma, as a locale writes them."""
+    head, body = text.split("TILT=NONE\n")
+    return f"{head}TILT=NONE\n{re.sub(r'[.](?=[0-9])', ',', body)}"
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "word"),
+    [
+        (ies_text(), 6, "22,5"),  # angles
+        (ies_text(np.array(QUADRANT) + 0.5, angles=(0, 20, 40, 60, 90)), 8, "400,5"),
+        (ies_text(ballast=0.9), 5, "0,9"),
+        (ies_text(size=(0.5, 0.5, 0)), 4, "0,5"),
+        (ies_text(multiplier=1.5), 4, "1,5"),
+        (ies_text(multiplier=0.5), 4, "0,5"),
+        (ies_text(lumens=999.5), 4, "999,5"),
+    ],
+)
+def test_decimal_commas_are_refused(text: str, line: int, word: str) -> None:
+    ies(text)
+    with pytest.raises(InputError) as error:
+        ies(with_commas(text))
+    problem = str(error.value)
+    assert problem.startswith(f"lamp.ies:{line}: {word!r}") or f"{word!r} in line {line}" in problem
+    assert problem.endswith("decimal commas? want points")
+
+
+@pytest.mark.parametrize("between", [",", ", ", " ,", ",\n"])
+def test_commas_between_numbers_are_separators(between: str) -> None:
+    head, body = ies_text().split("TILT=NONE\n")
+    report = Report()
+    lamp = ies(f"{head}TILT=NONE\n{between.join(body.split())}\n", report)
+    assert lamp.candela.tolist() == [list(row) for row in QUADRANT]
+    assert report.codes() == set()
 
 
 TILTED = "1\n3\n0 45 90\n0.9 0.95 1.2"
@@ -154,14 +223,36 @@ def test_what_is_broken_is_one_line(text: str, problem: str) -> None:
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("rest", ["", "\n", "\n\x1a", "\n; comment of the laboratory\n", " "])
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
-def test_a_file_that_stands_alone_reads_as_with_its_tilt_file(end: str) -> None:
+def test_a_file_that_stands_alone_reads_as_with_its_tilt_file(end: str, rest: str) -> None:
     data = ies_text(tilt="TILT=lamp.tlt").replace("\n", end).encode()
-    beside = {"lamp.tlt": TILTED.replace("\n", end).encode()}
-    alone = read_ies(with_tilt(data, beside.get), IES, Report())
-    assert alone.candela.tolist() == read_ies(data, IES, Report(), beside.get).candela.tolist()
-    for same in (data, ies_text().encode(), with_tilt(data, beside.get), b"EULUMDAT"):
-        assert with_tilt(same, {}.get) == same
+    beside = {"lamp.tlt": (TILTED + rest).replace("\n", end).encode()}
+    report = Report()
+    file = parse_ies(data, IES, report, beside.get)
+    assert ("profile-trailing" in report.codes()) == ("comment" in rest)
+    alone = parse_ies(with_tilt(data, file), IES, Report())
+    assert alone.tilt is not None
+    assert alone.tilt.angles.tolist() == [0, 45, 90]
+    assert alone.tilt.factors.tolist() == [0.9, 0.95, 1.2]
+    assert alone.candela.tolist() == [list(row) for row in QUADRANT]
+    assert alone.factor == pytest.approx(0.9, rel=1e-15)
+
+
+def test_a_file_that_stands_alone_stays_as_it_is() -> None:
+    for tilt in ("TILT=NONE", "TILT=gone.tlt", f"TILT=INCLUDE\n{TILTED}"):
+        data = ies_text(tilt=tilt).encode()
+        assert with_tilt(data, parse_ies(data, IES, Report())) == data
+
+
+def test_what_is_wrong_with_a_tilt_file_is_said_at_its_line() -> None:
+    data = ies_text(tilt="TILT=a.tlt").encode()
+    for text, problem in (
+        ("1\n3\n0 45 90\n0.9 x 1\n", "lamp.ies:a.tlt:4: tilt factors: no number among them"),
+        ("1\n2\n0 90\n0,9 1,0\n", "lamp.ies:a.tlt:4: '0,9', and more numbers than declared"),
+    ):
+        with pytest.raises(InputError, match=re.escape(problem)):
+            parse_ies(data, IES, Report(), {"a.tlt": text.encode()}.get)
 
 
 def test_the_kind_of_a_file_by_its_tilt_line() -> None:

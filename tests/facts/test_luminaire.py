@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from photometric_files import ies, ies_text
 
+from hdrusd.errors import InputError
 from hdrusd.photometry.luminaire import Luminaire
 
 
@@ -49,6 +50,44 @@ def test_all_planes_go_round(planes: list[float]) -> None:
     below = planes[-1] if planes[-1] < 360.0 else 200.0
     value = 4.0 if planes[-1] < 360.0 else 3.0
     assert lamp.value((below + 360.0) / 2, 45.0) == pytest.approx((value + last) / 2)
+
+
+@pytest.mark.parametrize(
+    "planes",
+    [
+        [7.5 + 15 * i for i in range(24)],
+        [15.0 * i for i in range(1, 25)],
+        [-180.0 + 15 * i for i in range(25)],
+        [-180.0 + 15 * i for i in range(24)],
+        [45.0, 135.0, 225.0, 315.0],
+        [90.0 + 15 * i for i in range(25)],
+        [5.0, 20.0, 100.0, 200.0, 280.0, 350.0],
+    ],
+)
+def test_a_whole_turn_begins_anywhere(planes: list[float]) -> None:
+    rows = [[100.0 + plane % 360.0] * 2 for plane in planes]
+    lamp = ies(ies_text(rows, planes=planes, angles=(0, 90)))
+    for plane, row in zip(planes, rows, strict=True):
+        assert lamp.value([plane, plane + 360.0], 45.0) == pytest.approx([row[0]] * 2)
+    # In a line between two neighbours, also through the plane where the file begins.
+    ring = sorted({plane % 360.0 for plane in planes})
+    for low, high in zip(ring, [*ring[1:], ring[0] + 360.0], strict=True):
+        middle = (low + high) / 2.0
+        assert lamp.value(middle, 45.0) == pytest.approx(100.0 + (low + high % 360.0) / 2.0), low
+    unfolded, candela = lamp.unfolded()
+    assert (unfolded[0], unfolded[-1]) == (0.0, 360.0)
+    assert candela[0].tolist() == candela[-1].tolist()
+
+
+@pytest.mark.parametrize("planes", [[180.0, 270.0, 360.0], [0.0, 60.0, 120.0, 200.0], [0.0, 45.0]])
+def test_a_part_of_a_turn_is_no_turn(planes: list[float]) -> None:
+    with pytest.raises(InputError, match="or a whole turn"):
+        of_c(planes)
+
+
+def test_ends_that_are_moved_stay_in_order() -> None:
+    with pytest.raises(InputError, match="not in ascending order"):
+        of_c([0.0, 30.0, 90.002, 90.004])
 
 
 def test_nearly_a_symmetry_is_one() -> None:

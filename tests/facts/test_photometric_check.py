@@ -51,6 +51,8 @@ def test_sound_files_have_no_findings() -> None:
         (good(keywords=f"{STATED}\n[OTHER] {'x' * 300}"), "photometric-header:6"),
         (good(keywords=f"{STATED}\n[_] x"), "photometric-header:6"),
         (good(label="IESNA: LM-63-2002"), "photometric-header:1"),
+        (good(label="\n\nIESNA: LM-63-2002"), "photometric-header:3"),
+        (good(label="\nIESNA:LM-63-2002"), "photometric-header:1"),
         (good(label="IES:LM-63-2031", photometric=1.0), "profile-edition:1"),
         (good(label=""), "profile-edition:1"),
         (good(lumens=-2.0), "photometric-number:7"),
@@ -69,6 +71,7 @@ def test_sound_files_have_no_findings() -> None:
         (good(np.subtract(QUADRANT, 7)), "profile-negative:13"),
         (good() + "9", "profile-trailing:14"),
         (good(tilt="TILT=gone.tlt"), "profile-tilt:6"),
+        (good([[1, 1]] * 4, planes=(45, 135, 225, 315), angles=(0, 90)), "photometric-angles:10"),
     ],
 )
 def test_deviations_of_lm_63(text: str, found: str) -> None:

@@ -61,7 +61,7 @@ def shines_alike(one: Document, other: Document) -> None:
 
 
 WORDS_OF_FILES = st.text(
-    st.characters(min_codepoint=0x21, max_codepoint=0xFF, exclude_categories=["C", "Z"]),
+    st.characters(min_codepoint=0x21, max_codepoint=0x2FFF, exclude_categories=["C", "Z"]),
     max_size=30,
 ).filter(lambda text: "[" not in text and "]" not in text)
 SIZES = st.floats(-3.0, 3.0)
@@ -220,7 +220,35 @@ def test_what_has_no_place_is_a_finding() -> None:
     ):
         assert codes(to_eulumdat, lost) == {"photometric-filled", "photometric-lost"}
     assert "photometric-lost" in codes(to_ies, ldt_text())  # direct ratios, housing
-    assert "photometric-lost" in codes(to_ies, ldt_text().replace("LED", "光"))
+
+
+def test_text_without_a_keyword_is_carried_or_a_finding() -> None:
+    free = "Free text of a lamp\nanother line " + 300 * "x"
+    report = Report()
+    old = parse(ies_text(label="", keywords=f"{free}\n[OTHER] said").encode())
+    assert isinstance(old, IesFile)
+    made = to_ies(old, IES, report)
+    lines = made.keywords["OTHER"].split("\n")
+    assert lines[:2] == ["said", "Free text of a lamp"]
+    assert "".join(lines[2:]) == "another line " + 300 * "x"
+    assert max(map(len, write(made).splitlines())) <= 256
+    assert [f.code for f in report] == ["photometric-filled"]
+    assert parse(write(made)).keywords == made.keywords  # type: ignore[union-attr]
+    found = Report()
+    to_eulumdat(old, IES, found)
+    assert "text without a keyword: no place in the new file" in {f.text for f in found}
+
+
+@pytest.mark.parametrize("start", [-180.0, 7.5, 15.0])
+def test_a_turn_is_written_from_0_to_360(start: float) -> None:
+    planes = start + np.arange(0.0, 360.0, 15.0)
+    rows: npt.NDArray[np.float64] = 100.0 + np.outer(planes % 360.0, [1.0, 2.0])
+    file = parse(ies_text(rows, planes=planes.tolist(), angles=(0, 90)).encode())
+    for convert in (to_ies, to_eulumdat):
+        made = convert(file, IES, Report())
+        assert made.planes[0] == 0.0
+        assert made.planes[-1] == (360.0 if convert is to_ies else (planes % 360.0).max())
+        shines_alike(file, parse(write(made)))
 
 
 def test_types_a_and_b_are_no_eulumdat() -> None:

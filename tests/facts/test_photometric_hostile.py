@@ -21,6 +21,9 @@ SEEDS = [
     ies_text([1, 2, 3, 4], planes=(-5, 5), angles=(-3, 3), type="A").encode(),
     ldt_text().encode(),
     ldt_text([[1, 2]] * 3, symmetry=2, planes=(0, 90, 180, 270), angles=(0, 90)).encode(),
+    ies_text([[1, 2]] * 4, planes=(-180, -90, 0, 90), angles=(0, 90)).encode("utf-8-sig"),
+    ldt_text([[1, 2]] * 3, symmetry=0, planes=(5, 120, 240), angles=(0, 90)).encode(),
+    ldt_text([[1, 2]] * 3, symmetry=3, planes=(-90, 0, 90), angles=(0, 90)).encode(),
 ]
 
 #: What a number may become.

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from hdrusd.photometry.light import cone_factor, focus_factor, inverse_edge
-from hdrusd.photometry.spread import SHAPES, Beam, Spread, beam_solid_angle, solid_angle
+from hdrusd.photometry.spread import SHAPES, Beam, Emitter, Spread, beam_solid_angle, solid_angle
 
 #: A beam of none of the others' shape.
 NARROW = Beam(30.0, 0.4, 3.0)
@@ -56,3 +57,48 @@ def test_soft_cones_are_the_renderers_own(beam: Beam) -> None:
     expected = 2.0 * math.pi * float(np.sum(share * np.sin(angle))) * float(outer) / 1_000_000
     # The midpoint rule in a million steps is good to 1e-10 here.
     assert solid_angle("cone", beam) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("beam", "angle"),
+    [
+        # int_0^a cos sin 2 pi dt = pi sin^2 a before a face, which does not shine behind
+        (Beam(emitter="face"), math.pi),
+        (Beam(60.0, emitter="face"), 0.75 * math.pi),
+        (Beam(120.0, emitter="face"), math.pi),
+        # int cos^(n + 1) sin 2 pi dt over a half space
+        (Beam(exponent=3.0, emitter="face"), 2.0 * math.pi / 5.0),
+        (Beam(90.0, 0.0, 0.5, emitter="face"), 2.0 * math.pi / 2.5),
+        # int sin^2 t dt 2 pi about a tube; half of it within 90 degrees of the axis
+        (Beam(emitter="tube"), math.pi**2),
+        (Beam(90.0, emitter="tube"), 0.5 * math.pi**2),
+        # with cos t = sin u cos v about the tube: int sin^(n + 2) u du int |cos v|^n dv
+        (Beam(exponent=1.0, emitter="tube"), (4.0 / 3.0) * 4.0),
+        (Beam(exponent=2.0, emitter="tube"), (3.0 * math.pi / 8.0) * math.pi),
+        (Beam(90.0, 0.0, 4.0, emitter="tube"), (5.0 * math.pi / 16.0) * (3.0 * math.pi / 8.0)),
+    ],
+)
+def test_faces_and_tubes(beam: Beam, angle: float) -> None:
+    # The midpoint rule in 32,768 steps of at most 1e-4 rad: 1e-8 / 12, some more at a root.
+    assert solid_angle("cone", beam) == pytest.approx(angle, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    "beam", [Beam(80.0, 1.0, 0.0), Beam(135.0, 0.3, 2.5), Beam(30.0, 0.4, 3.0)]
+)
+@pytest.mark.parametrize("emitter", ["face", "tube"])
+def test_soft_cones_of_faces_and_tubes(beam: Beam, emitter: Emitter) -> None:
+    """A sum over directions: the shape's share is the cosine to -Z, or the sine to the tube, X."""
+    n = 2000
+    angle, turn = ((np.arange(n) + 0.5) * end / n for end in (math.pi, 2.0 * math.pi))
+    cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    shape = np.broadcast_to(np.maximum(cosine, 0.0), (n, n))
+    if emitter == "tube":
+        shape = np.sqrt(1.0 - (sine * np.cos(turn)) ** 2)
+    outer = np.float64(math.radians(beam.cutoff))
+    inner = outer * (1.0 - beam.softness)
+    share = cone_factor(cosine, inner, inverse_edge(inner, outer))
+    share *= focus_factor(cosine, np.float64(beam.exponent))
+    wanted = float(np.sum(share * shape * sine)) * (math.pi / n) * (2.0 * math.pi / n)
+    # Steps of 2e-3 rad: their square.
+    assert solid_angle("cone", replace(beam, emitter=emitter)) == pytest.approx(wanted, rel=1e-5)

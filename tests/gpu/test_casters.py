@@ -141,6 +141,20 @@ def test_a_cutout_casts_with_its_holes(gl: Any, moving: bool) -> None:
     assert np.all(seen(gl, shown, BELOW) == 1.0)
 
 
+@pytest.mark.parametrize("code", [7, 51, 100, 128, 255])
+def test_a_texel_at_the_threshold_casts(gl: Any, code: int) -> None:
+    """As what is seen of the surface does; half floats round some of these codes down."""
+    material = Material(
+        opacity_map=TextureUse(TextureRef("a.exr", "linear", "clamp", "clamp"), channel=0),
+        opacity_threshold=code / 255.0,
+    )
+    roof = quad((-0.5, -0.5, 1.3), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), key="roof")
+    shown = scene(LAMP, FLOOR, draw(roof, 3), materials=(*MATERIALS, material))
+    for alpha, light in ((code, 0.0), (code - 1, 1.0)):
+        image = np.full((4, 4, 1), alpha / 255.0, np.float16)
+        assert seen(gl, shown, BELOW, shadows=maps(gl, images={"a.exr": image}))[0] == light
+
+
 def test_nothing_inside_the_lamp_casts(gl: Any) -> None:
     """A lampshade of half side 0.1 around a lamp of radius 0.2 lets it shine; a larger one not."""
     shade = slab((-0.1, -0.1, 3.9), (0.1, 0.1, 4.1))

@@ -115,6 +115,14 @@ def test_map_of_a_number(gl: Any, field: str, channel: int) -> None:
     assert value(gl, field, **maps) == pytest.approx(TEXEL[k] * scale[k] + bias[k], rel=1e-6)
 
 
+@pytest.mark.parametrize("field", ["diffuse", "specular"])
+def test_reflectances_stay_in_their_range(gl: Any, field: str) -> None:
+    """(0.5, 0.25, 0.75) by (3, 2, 1) less (0, 0.75, 0) is (1.5, -0.25, 0.75)."""
+    scale, bias = (3.0, 2.0, 1.0, 1.0), (0.0, -0.75, 0.0, 0.0)
+    got = value(gl, field, **{f"{field}_map": use(scale=scale, bias=bias)})
+    np.testing.assert_allclose(got, [1.0, 0.0, 0.75], rtol=1e-6)
+
+
 @pytest.mark.parametrize("field", SCALARS)
 @pytest.mark.parametrize(("bias", "wanted"), [(-2.0, 0.0), (5.0, 1.0)])
 def test_numbers_stay_in_their_range(gl: Any, field: str, bias: float, wanted: float) -> None:

@@ -136,6 +136,20 @@ def test_one_channel_of_an_opacity_map(gl: Any, channel: int) -> None:
     np.testing.assert_array_equal(got.surface[whole.surface][sure], wanted[sure] > 0.5)
 
 
+@pytest.mark.parametrize("dtype", [np.uint8, np.float16])
+@pytest.mark.parametrize("code", [7, 51, 100, 128, 255])
+def test_a_texel_at_the_threshold_is_there(gl: Any, code: int, dtype: Any) -> None:
+    """By glTF 2.0, 3.9.6, what is not below the cutoff is opaque. Half floats may round down."""
+    codes = np.arange(256).reshape(16, 16, 1)
+    picture = codes.astype(dtype) if dtype is np.uint8 else (codes / 255.0).astype(dtype)
+    use = texture(channel=0, wrap_s="clamp", wrap_t="clamp")
+    material = Material(opacity_map=use, opacity_threshold=code / 255.0, emission=(1.0,) * 3)
+    # A pixel shows a texel's centre: the square is 16 pixels wide.
+    made = replace(scene(material), camera=replace(look(), window=(-1 / 3, 1 / 3, -1 / 3, 1 / 3)))
+    got = render(gl, made, lambda ref: ImageData(picture), (16, 16))
+    np.testing.assert_array_equal(got.frame[..., 0] > 0.5, codes[..., 0] >= code)
+
+
 def test_three_maps_with_a_coordinate_set_each(gl: Any) -> None:
     material = Material(
         diffuse_map=texture(uv_set="plain"),

@@ -5,10 +5,13 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
+import numpy as np
 import pytest
-from flt_builder import SQUARE, Loaded, Pool, database, face, load, texture, thing, vertex
+from flt_builder import SQUARE, Loaded, Pool, database, face, load, material, texture, thing, vertex
 
-from hdrusd.images import read_image
+from hdrusd.conversion import Options
+from hdrusd.convert import convert
+from hdrusd.images import read_exr, read_image
 from hdrusd.importers.flt_textures import has_alpha
 from hdrusd.report import Kind
 
@@ -80,6 +83,37 @@ def test_attributes_that_are_odd(tmp_path: Path, said: bytes, code: str) -> None
     assert made.report.codes() == {code}
     assert made.material.diffuse_map is not None
     assert made.material.diffuse_map.mode == ("DECAL" if code == "flt-texture-mode" else "MODULATE")
+
+
+@pytest.mark.parametrize(
+    ("mode", "words", "diffuse"),
+    [
+        (0, None, 0.5),
+        (1, "environment BLEND; kept as a note, shown as MODULATE", 0.5),
+        (2, "environment DECAL: in place of the material's colour; shown with D = 1", 1.0),
+        (3, "environment REPLACE: in place of the material's colour; shown with D = 1", 1.0),
+        (4, "environment ADD; kept as a note, shown as MODULATE", 0.5),
+    ],
+)
+def test_what_is_said_of_an_environment_is_done(
+    tmp_path: Path, mode: int, words: str | None, diffuse: float
+) -> None:
+    """R = T^2.2 D of the codes 10, 20 and 30, where D of the material is 0.5."""
+    (tmp_path / "a.rgb").write_bytes(sgi(3))
+    (tmp_path / "a.rgb.attr").write_bytes(attributes(mode=mode))
+    pool = Pool()
+    corners = pool.add(*(vertex(p, None, p[:2]) for p in SQUARE))
+    own = thing("o", face(corners, texture=0, material=0))
+    palettes = texture(0, "a.rgb") + material(0, "paint")
+    path = tmp_path / "scene.flt"
+    path.write_bytes(database(own, palettes=palettes, vertices=pool.data))
+    result = convert(path, tmp_path / "scene.usda", Options())
+    said = [f.text for f in result.report if f.code == "flt-texture-mode"]
+    assert said == ([] if words is None else [f"texture {words}"])
+    (name,) = [name for name, made in result.textures.items() if made["kind"] == "reflectance"]
+    rgb, _ = read_exr(tmp_path / "scene.textures" / name)
+    wanted = (np.array([10, 20, 30]) / 255.0) ** 2.2 * diffuse
+    assert rgb[0, 0] == pytest.approx(wanted, rel=2**-11)  # half floats
 
 
 def test_alpha_is_cut_out_unless_the_template_blends(tmp_path: Path) -> None:

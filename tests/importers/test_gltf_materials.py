@@ -94,6 +94,16 @@ def test_unlit_is_kept(tmp_path: Path) -> None:
     assert not material(tmp_path, {"extensions": {"KHR_materials_unlit": {}}})[0].lit
 
 
+def test_unlit_is_no_metal(tmp_path: Path) -> None:
+    """The extension knows no highlight, so that a metallicFactor that is not there is none."""
+    coat = {"KHR_materials_clearcoat": {"clearcoatFactor": 1.0}}
+    rough = {"pbrMetallicRoughness": {"roughnessFactor": 0.2, "metallicFactor": 1.0}}
+    for more in ({}, rough):
+        made, _ = material(tmp_path, {"extensions": {"KHR_materials_unlit": {}, **coat}, **more})
+        assert made.pbr == {"metallic": 0.0, "roughness": 1.0}
+        assert made.metallic_map is None
+
+
 @pytest.mark.parametrize(
     ("mode", "alpha", "channel"),
     [("OPAQUE", 1.0, None), ("MASK", 0.25, "a"), ("BLEND", 0.25, "a"), ("FOG", 1.0, None)],
@@ -180,6 +190,46 @@ def test_embedded_images_are_told_by_their_first_bytes(
     assert texture is not None
     assert (texture.image.data, texture.image.name) == (content, f"image_0.{suffix}")
     assert texture.image.path is None
+
+
+@pytest.mark.parametrize(
+    ("names", "wanted"),
+    [
+        (["asphalt_road", "wet asphalt"], ["asphalt_road.png", "wet asphalt.png"]),
+        (["road.png", "road.TGA"], ["road.png", "road_1.png"]),
+        (["road", "road"], ["road.png", "road_1.png"]),
+        (["road_1", "road"], ["road_1.png", "road.png"]),
+        (["image_1", ""], ["image_1.png", "image_1_1.png"]),
+        (["v1.2", "..."], ["v1.2.png", "image_1.png"]),
+        (["../../etc/passwd", "C:\\a\nb\0c"], ["_.._etc_passwd.png", "C__a_b_c.png"]),
+        (["x" * 5000, "\ud800"], ["x" * 64 + ".png", "?.png"]),
+        ([7, None], ["image_0.png", "image_1.png"]),
+    ],
+)
+def test_an_embedded_image_keeps_its_name(
+    tmp_path: Path, names: list[Any], wanted: list[str]
+) -> None:
+    source = BASE | {"emissiveTexture": {"index": 1}}
+    doc = Doc(materials=[source], textures=[{"source": 0}, {"source": 1}])
+    doc.json["images"] = [{"bufferView": doc.view(PNG), "name": name} for name in names]
+    made = load_doc(tmp_path, doc)[0].materials[0]
+    assert made.diffuse_map is not None
+    assert made.emission_map is not None
+    assert [made.diffuse_map.image.name, made.emission_map.image.name] == wanted
+
+
+def test_an_embedded_image_is_told_from_a_file(tmp_path: Path) -> None:
+    (tmp_path / "wall.png").write_bytes(PNG)
+    for embedded, name in ((1, "wall_1.png"), (0, "wall.png")):
+        source = BASE | {"emissiveTexture": {"index": 1}}
+        doc = Doc(materials=[source], textures=[{"source": 0}, {"source": 1}])
+        images: list[Any] = [{"uri": "wall.png"}]
+        images.insert(embedded, {"bufferView": doc.view(PNG), "name": "wall"})
+        doc.json["images"] = images
+        made = load_doc(tmp_path, doc)[0].materials[0]
+        found = (made.diffuse_map, made.emission_map)[embedded]
+        assert found is not None
+        assert found.image.name == name
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from hdrusd.errors import InputError, SourceRef
-from hdrusd.importers.importer import Limits, Resolver, read
+from hdrusd.importers.importer import Limits, Resolver, read, resolver_of
 from hdrusd.report import Report
 
 
@@ -69,6 +70,62 @@ def test_a_name_that_is_none_is_missing(model: Path, name: str) -> None:
     assert find(Resolver(model, report), name) is None
     assert report.codes() <= {"file-missing", "file-refused"}
     assert len(report) == 1
+
+
+@pytest.mark.parametrize("name", ["maps.png", "MAPS.PNG", "pipe.png"])
+def test_what_is_no_file_is_said(model: Path, name: str) -> None:
+    """No root would help."""
+    (model.parent / "maps.png").mkdir()
+    os.mkfifo(model.parent / "pipe.png")
+    report = Report()
+    for roots in ([], [model.parent]):
+        assert find(Resolver(model, report, roots=roots), name) is None
+    (finding,) = report
+    kind = "not a regular file" if "pipe" in name else "a folder"
+    assert (finding.code, finding.text) == ("file-missing", f"{name}: {kind}; want a file")
+
+
+def test_a_file_goes_before_a_folder_of_its_name(model: Path) -> None:
+    (model.parent / "Paint.png").mkdir()
+    report = Report()
+    found = find(Resolver(model, report, roots=[model.parents[1]]), "Paint.png")
+    assert found is not None
+    assert found.read_bytes() == b"paint"
+
+
+def test_names_that_differ_in_case_alone_are_told_apart(model: Path) -> None:
+    """As written where that is there, else the first by code points."""
+    for name in ("WALL.png", "Wall.png", "wall.png"):
+        (model.parent / name).write_bytes(name.encode())
+    report = Report()
+    resolver = Resolver(model, report)
+    for name, wanted in (("wALL.png", "WALL.png"), ("wall.png", "wall.png"), ("Wall.png",) * 2):
+        found = find(resolver, name)
+        assert found is not None
+        assert found.read_bytes() == wanted.encode()
+    assert len(report) == 1
+
+
+def test_a_folder_is_listed_once_for_all_that_is_not_there(
+    model: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listed = []
+    iterdir = Path.iterdir
+
+    def counted(self: Path) -> Iterator[Path]:
+        listed.append(self.resolve())
+        return iterdir(self)
+
+    monkeypatch.setattr(Path, "iterdir", counted)
+    (model.parent / "link").symlink_to(".")
+    report = Report()
+    above = Resolver(model, report, roots=[model.parents[1]])
+    for resolver in (above, resolver_of(model.parent / "part.obj", above)):
+        for name in ("gone.png", "link/gone.png", "link/link/lost.png", "../meshes/lost.png"):
+            assert find(resolver, name) is None
+    textures = model.parents[1] / "materials" / "textures"
+    assert sorted(listed) == sorted([model.parent, textures])
+    assert report.codes() == {"file-missing"}
 
 
 def test_a_file_that_lies_as_written_needs_no_word(model: Path) -> None:

@@ -124,7 +124,7 @@ def test_forms_of_a_color(
     ],
 )
 def test_opacity(tmp_path: Path, statements: str, alpha: float, codes: set[str]) -> None:
-    loaded = load_material(tmp_path, statements)
+    loaded = load_material(tmp_path, f"Kd 1 1 1\n{statements}")
     assert loaded.material.alpha == alpha
     assert loaded.material.alpha_mode == ("opaque" if alpha == 1 else "blend")
     assert loaded.report.codes() == {"obj-units"} | codes
@@ -314,6 +314,27 @@ def test_an_emission_map_without_a_factor_is_the_emission(tmp_path: Path) -> Non
     assert loaded.finding("mtl-emission-factor").kind is Kind.ASSUMED
 
 
+@pytest.mark.parametrize(
+    ("statements", "diffuse", "codes"),
+    [
+        ("map_Kd x.png", (1, 1, 1), {"mtl-diffuse-factor"}),
+        ("Kd 0.5 0.5 0.5\nmap_Kd x.png", (0.5, 0.5, 0.5), set()),
+        ("map_Kd gone.png", (0.8, 0.8, 0.8), {"mtl-diffuse-default", "file-missing"}),
+        ("Ks 0 0 0", (0.8, 0.8, 0.8), {"mtl-diffuse-default"}),  # OpenGL 1.1, glMaterial
+        ("Kd x\nmap_Kd x.png", (0.8, 0.8, 0.8), {"mtl-number"}),
+    ],
+)
+def test_a_diffuse_map_without_a_factor_is_the_reflectance(
+    tmp_path: Path, statements: str, diffuse: tuple[float, ...], codes: set[str]
+) -> None:
+    """Blender writes map_Kd alone, and means its texels."""
+    (tmp_path / "x.png").write_bytes(PNG)
+    loaded = load_material(tmp_path, statements)
+    assert loaded.material.diffuse == diffuse
+    assert loaded.report.codes() == codes | {"obj-units"}
+    assert ("diffuse" in loaded.material.defaults) == bool(codes)
+
+
 @pytest.mark.parametrize("statements", ["Ke 0 0 0\nmap_Ke x.png", "Kd 0 0 0\nmap_Kd x.png"])
 def test_a_factor_of_zero_stays_and_is_said(tmp_path: Path, statements: str) -> None:
     (tmp_path / "x.png").write_bytes(PNG)
@@ -346,7 +367,7 @@ def test_what_has_no_home_is_one_finding_and_metadata(tmp_path: Path) -> None:
 
 
 def test_a_filter_that_lets_all_through_loses_nothing(tmp_path: Path) -> None:
-    assert load_material(tmp_path, "Tf 1.0 1.0 1.0").report.codes() == {"obj-units"}
+    assert load_material(tmp_path, "Kd 1 1 1\nTf 1 1 1.0").report.codes() == {"obj-units"}
 
 
 def test_unknown_statements(tmp_path: Path) -> None:

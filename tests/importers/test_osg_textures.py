@@ -89,13 +89,18 @@ def test_generated_coordinates_drop_the_texture(tmp_path: Path) -> None:
     assert (made.material.diffuse_map, made.codes()) == (None, {"osg-texture-generated"})
 
 
-def test_an_environment_other_than_modulate_is_noted(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("mode", "words"),
+    [("DECAL", "D = 1"), ("REPLACE", "D = 1"), ("BLEND", "as MODULATE"), ("ADD", "as MODULATE")],
+)
+def test_an_environment_other_than_modulate_is_noted(tmp_path: Path, mode: str, words: str) -> None:
     (tmp_path / "a.png").touch()
-    unit = texture(named("a.png")) + "\nosg::TexEnv {\nMode DECAL \n}\nValue OFF "
+    unit = texture(named("a.png")) + f"\nosg::TexEnv {{\nMode {mode} \n}}\nValue OFF "
     made = dressed(tmp_path, state_set(unit=unit))
     assert made.material.diffuse_map is not None
-    assert made.material.diffuse_map.mode == "DECAL"
+    assert made.material.diffuse_map.mode == mode
     assert made.codes() == {"osg-texture-mode"}
+    assert made.finding("osg-texture-mode").text.endswith(words)
 
 
 def inline(folder: Path, size: str, pixel_format: int, data: bytes, packing: int = 1) -> Material:

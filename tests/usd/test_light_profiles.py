@@ -130,6 +130,7 @@ def test_a_file_in_a_package(stage: Usd.Stage, tmp_path: Path) -> None:
     [
         ("/a/lamp.ies", "t.tlt", "/a/t.tlt"),
         ("/a/lamp.ies", "..\\..\\etc/t.tlt", "/a/t.tlt"),
+        ("/a [1]/lamp[1].ies", "t[2].tlt", "/a [1]/t[2].tlt"),
         ("/a/b.usdz[lamp.ies]", "t.tlt", "/a/b.usdz[t.tlt]"),
         ("/a/b.usdz[0/lamp.ies]", "/t.tlt", "/a/b.usdz[0/t.tlt]"),
     ],

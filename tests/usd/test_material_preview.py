@@ -59,16 +59,30 @@ def test_every_input_takes_every_output_of_a_texture(
     color = name.endswith("Color")
     inputs = fed(name, "color3f" if color else "float", output)
     workflow = f"\nint inputs:useSpecularWorkflow = {int(name == 'specularColor')}"
-    numbers = "float4 inputs:scale = (2, 3, 4, 5)\nfloat4 inputs:bias = (0, 1, 0, 1)"
+    numbers = "float4 inputs:scale = (0.5, 0.25, 1, 0.125)\nfloat4 inputs:bias = (0, 0.5, 0, 0.25)"
     report = Report()
     made = shown(network(tmp_path, inputs + workflow, uv_texture(f"{RAW}\n{numbers}")), report)
     use = getattr(made, f"{field}_map")
     whole = -1 if color else 0  # a number takes the first of three
     assert use.channel == {"rgb": whole, "r": 0, "g": 1, "b": 2, "a": 3}[output]
-    assert (use.scale, use.bias) == ((2.0, 3.0, 4.0, 5.0), (0.0, 1.0, 0.0, 1.0))
+    assert (use.scale, use.bias) == ((0.5, 0.25, 1.0, 0.125), (0.0, 0.5, 0.0, 0.25))
     assert use.texture.decode == "linear"
     assert not report.codes()
     assert list(made.maps()) == [f"{field}_map"]
+
+
+@pytest.mark.parametrize(
+    ("scale", "bias"), [("2, 1, 1, 1", "0, 0, 0, 0"), ("1, 1, 1, 1", "0, 0, -0.1, 0")]
+)
+def test_scale_and_bias_that_leave_no_reflectance_are_said(
+    tmp_path: Path, scale: str, bias: str
+) -> None:
+    numbers = f"float4 inputs:scale = ({scale})\nfloat4 inputs:bias = ({bias})"
+    report = Report()
+    shown(
+        network(tmp_path, fed("diffuseColor", "color3f"), uv_texture(f"{RAW}\n{numbers}")), report
+    )
+    assert report.codes() == {"value-range"}
 
 
 @pytest.mark.parametrize(

@@ -11,12 +11,12 @@ import pytest
 from builders import HERE, node, one_square, square
 from pxr import Usd, UsdGeom, UsdSkel
 
+from hdrusd.checking import validate
 from hdrusd.legacy.scene import TRS, Channel, LegacyScene, Node, Skin
 from hdrusd.report import Report
 from hdrusd.scene import Camera
 from hdrusd.usd.extract import StageReader
 from hdrusd.usd.writer import StageWriter
-from hdrusd.validation import validate
 
 #: A bar of two quads along x: its elbow at 1, its end at 2. Points 0 and 3 at 0, and so on.
 BAR = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 0, 1], [1, 0, 1], [2, 0, 1]], np.float32)

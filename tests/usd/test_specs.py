@@ -62,6 +62,7 @@ def test_a_mesh_is_what_its_schema_says() -> None:
     made.CreateDisplayColorPrimvar(mesh.colors_interpolation).Set(colors[:, :3].copy())
     made.CreateDisplayOpacityPrimvar(mesh.colors_interpolation).Set(colors[:, 3].copy())
     subset = UsdGeom.Subset.CreateGeomSubset(made, "paint", "face", [], "materialBind").GetPrim()
+    UsdShade.MaterialBindingAPI(made).SetMaterialBindSubsetsFamilyType("nonOverlapping")
     UsdShade.MaterialBindingAPI.Apply(subset).GetDirectBindingRel().SetTargets(["/M"])
     assert text(ours) == text(usd)
 

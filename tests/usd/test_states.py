@@ -19,7 +19,7 @@ from hdrusd.report import Report
 from hdrusd.scene import Camera
 from hdrusd.usd.extract import StageReader
 from hdrusd.usd.fixtures import Lamp
-from hdrusd.usd.placed import area_scales, extents
+from hdrusd.usd.placed import extents, mesh_areas
 from hdrusd.usd.states import states_of
 from hdrusd.usd.variants import select_variants
 from hdrusd.usd.writer import LightAt, StageWriter
@@ -128,11 +128,11 @@ def test_bounding_boxes_and_the_diagonal_are_of_one_state(tmp_path: Path) -> Non
     made = written(tmp_path, scene_of(tree, count=2))
     assert made.diagonal() == pytest.approx(2.0**0.5)
     assert extents(made.stage)[1] == pytest.approx(1.0)
-    areas = area_scales(made.stage, made.meshes, made.tree.copies)
-    assert areas == {0: pytest.approx(1.0), 1: 0.0}
+    areas = mesh_areas(made.stage, made.meshes, made.tree.copies)
+    assert {mesh: area.of(np.eye(3)).tolist() for mesh, area in areas.items()} == {0: [1.0] * 3}
     made.set_visible(next(p for p in made.places if p.node is far), visible=True)
     assert made.diagonal() == pytest.approx(2.0**0.5)
-    assert area_scales(made.stage, made.meshes, made.tree.copies)[0] == 0.0
+    assert 0 not in mesh_areas(made.stage, made.meshes, made.tree.copies)
     made.set_visible(next(p for p in made.places if p.node is near), visible=True)
     stage = saved(made)
     box = UsdGeom.BBoxCache(0, ["default"]).ComputeWorldBound(stage.GetPseudoRoot())

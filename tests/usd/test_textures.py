@@ -42,6 +42,17 @@ def test_tiles_by_column_and_row(tmp_path: Path) -> None:
     assert not report.codes()
 
 
+@pytest.mark.parametrize("name", ["wood[1].png", "wood [old].<UDIM>.png", "[a]/wood.png"])
+def test_a_bracket_in_a_files_name_makes_no_package_of_it(tmp_path: Path, name: str) -> None:
+    png(tmp_path / name.replace("<UDIM>", "1001"), grey(10))
+    report = Report()
+    image = load(tmp_path / name, report)
+    assert image is not None
+    whole = image if image.tiles is None else image.tiles[0, 0]
+    assert whole.pixels.tolist() == grey(10).tolist()
+    assert not report.codes()
+
+
 def test_missing_tiles_are_said(tmp_path: Path) -> None:
     png(tmp_path / "a.1001.png", grey(10))
     png(tmp_path / "a.1013.png", grey(10))

@@ -13,8 +13,8 @@ from pxr import Sdf, Tf, Usd, UsdValidation
 from validated import AGREEING, found, light, only, open_stage, world
 
 from hdrusd import validation
+from hdrusd.checking import BUILT_IN, validate
 from hdrusd.schemas import PLUGIN_DIR
-from hdrusd.validation import BUILT_IN, validate
 
 # What USD knows of the validators.
 
@@ -64,7 +64,7 @@ def test_too_late_is_an_error() -> None:
         "UsdValidation.ValidationRegistry().GetAllValidatorMetadata()\n"
         "from hdrusd.errors import SchemaRegistrationError\n"
         "try:\n"
-        "    from hdrusd.validation import validate\n"
+        "    import hdrusd.validation\n"
         "except SchemaRegistrationError as error:\n"
         "    print(error)"
     )

@@ -6,7 +6,7 @@ import math
 
 from pxr import Sdf, Usd
 
-from hdrusd.validation import Problem, validate
+from hdrusd.checking import Problem, validate
 
 METRES = '(defaultPrim = "World"\n metersPerUnit = 1\n upAxis = "Z")'
 

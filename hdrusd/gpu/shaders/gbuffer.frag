@@ -141,6 +141,9 @@ vec3 bumped(vec3 n, vec3 tangent_space, vec2 place)
 void main()
 {
     vec3 base = diffuse DIFFUSE_MAP;
+#ifdef DIFFUSE_HELD            // where scale and bias lead a texel out of 0 to 1
+    base = clamp(base, 0.0, 1.0);
+#endif
 #ifdef VERTEX_COLOR
     base *= color;
 #endif
@@ -157,7 +160,11 @@ void main()
     vec3 lux = ambient;
 #endif
     vec3 rho = base * (1.0 - metal);
-    vec3 f0 = mix(specular SPECULAR_MAP, base, metal);
+    vec3 f0 = specular SPECULAR_MAP;
+#ifdef SPECULAR_HELD
+    f0 = clamp(f0, 0.0, 1.0);
+#endif
+    f0 = mix(f0, base, metal);
 #ifdef GGX
     // What sky.frag mirrors is lost to what lies below.
     vec3 scattered = rho * (1.0 - fresnel(f0, grazing_reflectance(f0, metal), MEAN_SCHLICK));
