@@ -170,7 +170,7 @@ def test_arithmetic_with_constants(tmp_path: Path) -> None:
     twice = "color3f inputs:in1.connect = </Looks/paint/P.outputs:out>\n"
     nodes = (
         image("P")
-        + node("M", "ND_multiply_color3", f"{twice}color3f inputs:in2 = (2, 2, 4)")
+        + node("M", "ND_multiply_color3", f"{twice}color3f inputs:in2 = (2, 2, 3)")
         + node("I", "ND_invert_color3", "color3f inputs:in.connect = </Looks/paint/M.outputs:out>")
         + node(
             "D",
@@ -185,7 +185,7 @@ def test_arithmetic_with_constants(tmp_path: Path) -> None:
         )
     )
     use = base(tmp_path, nodes)
-    assert use.scale[:3] == (-0.5, -0.5, -1.0)
+    assert use.scale[:3] == (-0.5, -0.5, -0.75)
     assert use.bias[:3] == (0.75, 0.75, 0.75)
 
 
