@@ -54,7 +54,7 @@ _RESOLUTION = (1280, 720)
 def convert(source: Path, output: Path, options: Options, report: Report | None = None) -> Result:
     """Convert one file. Raises InputError, ValidationError; ``output`` is whole or untouched."""
     report = Report() if report is None else report
-    check_output(output, OUTPUT_SUFFIXES)
+    check_output(output, OUTPUT_SUFFIXES, over_stage=source.suffix.lower() in STAGES)
     check_input(source)
     # OUTPUT names a stage with its folders, a database by its name.
     check_path(source.absolute() if source.suffix.lower() in STAGES else Path(source.name))

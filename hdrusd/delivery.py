@@ -7,7 +7,7 @@ import fcntl
 import os
 import re
 import unicodedata
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
@@ -26,7 +26,7 @@ _TEXTURES = "textures"
 
 #: What stands in the head of the layer that is always there.
 _MARK, _HEAD = b'authorship:hdrusd:softwarePackage = "hdrusd"', 1 << 16
-_EMPTY = b"#usda 1.0"
+_PRIM = re.compile(rb"^(def|over|class)\b", re.MULTILINE)
 
 
 def check_path(path: Path) -> None:
@@ -37,8 +37,8 @@ def check_path(path: Path) -> None:
             raise InputError(path, text)
 
 
-def check_output(output: Path, suffixes: Sequence[str]) -> None:
-    """Refuse what cannot become the name of a stage. Raises InputError."""
+def check_output(output: Path, suffixes: Sequence[str], *, over_stage: bool = False) -> None:
+    """Refuse what cannot become the name of a stage, or of a layer over one. Raises InputError."""
     check_path(output.absolute())
     if output.suffix.lower() not in suffixes:
         raise InputError(output, f"{output.suffix or 'no suffix'}; want {suffixes[0]}")
@@ -50,8 +50,20 @@ def check_output(output: Path, suffixes: Sequence[str]) -> None:
     textures = output.with_name(f"{output.stem}.{_TEXTURES}")
     if textures.exists() and not (output.exists() and output.with_name(longest).exists()):
         raise _foreign(textures)  # it would be replaced, and may well be the source's own
-    for layer in places(output)[1:-1]:
-        if layer.is_dir():
+    layers = (_PHOTOMETRY,) if over_stage else _LAYERS
+    _check_layers(output, [output.with_name(f"{output.stem}.{layer}") for layer in layers])
+
+
+def _check_layers(output: Path, layers: Iterable[Path]) -> None:
+    """Refuse to replace layers where nothing says that they are of a conversion into ``output``.
+
+    The photometry stands first and the root last, so that one of them is there whenever a run
+    was killed. Raises InputError.
+    """
+    traces = output, output.with_name(f"{output.stem}.{_PHOTOMETRY}")
+    known = any(trace.exists() for trace in traces)
+    for layer in layers:
+        if layer.is_dir() or (layer.exists() and not known):
             raise _foreign(layer)
 
 
@@ -79,12 +91,15 @@ def _is_converted(output: Path) -> bool:
     """Whether the layers of a stage of this name are of a conversion into it."""
     photometry = output.with_name(f"{output.stem}.{_PHOTOMETRY}")
     try:
-        said = _head(photometry)
-        if said.strip() == _EMPTY:  # over a stage without lights and materials
-            return _named(photometry.name) in _head(output)
+        said, root = _head(photometry), _head(output)
     except OSError:
         return False
-    return _MARK in said
+    if _MARK in said:
+        return True
+    # The mark is on the default prim, which may stand far behind, or be none; without lights and
+    # materials there is nothing in the layer but what holds for all of it.
+    ours = b"Hdrusd" in said or (said.startswith(b"#usda") and not _PRIM.search(said))
+    return ours and _named(photometry.name) in root
 
 
 def earlier_files(output: Path) -> list[Path]:
@@ -212,14 +227,11 @@ def _rename_all(folder: Path, output: Path) -> None:
     """File by file: others' files may lie in the folder of textures."""
     home, old = output.parent, folder / _ASIDE
     made = [path.relative_to(folder) for path in folder.rglob("*") if not path.is_dir()]
-    made.sort(key=lambda way: (way.name == output.name, len(way.parts) == 1, way))
+    photometry = f"{output.stem}.{_PHOTOMETRY}"  # names textures, and no stage names it yet
+    made.sort(key=lambda way: (way.name == output.name, way.name != photometry, way))
     new = set(made)
-    earlier = earlier_files(output)
-    for way in made:
-        layer = home / way
-        if len(way.parts) == 1 and layer != output and layer.exists() and layer not in earlier:
-            raise _foreign(layer)
-    before = (path.relative_to(home) for path in earlier)
+    _check_layers(output, (home / way for way in made if len(way.parts) == 1))
+    before = (path.relative_to(home) for path in earlier_files(output))
     gone = [way for way in before if way not in new]
     inner = {way.parent for way in (*made, *gone)} - {Path()}
     linked = [way for way in inner if (home / way).is_symlink()]  # what lies elsewhere stays there

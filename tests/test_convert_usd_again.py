@@ -90,6 +90,22 @@ def test_what_was_added_to_a_converted_stage_is_converted(tmp_path: Path) -> Non
     assert made == ["town.usda", "grown.usda"]
 
 
+def test_a_blocked_sample_is_no_strength(tmp_path: Path) -> None:
+    """What is in the samples of a photometric light may be nothing (a value block)."""
+    moving = "float inputs:intensity.timeSamples = { 1: 3, 5: 1, 9: 2 }"
+    source = stage_file(
+        tmp_path / "town.usda", lamp("SphereLight", f"{moving}\nfloat inputs:radius = 1")
+    )
+    first = run(source, tmp_path / "night.usda")
+    layer = Sdf.Layer.FindOrOpen(str(first.output.with_suffix(".photometry.usda")))
+    at = Sdf.Path("/World/Lamp.inputs:photometric:luminousIntensity")
+    layer.SetTimeSample(at, 5.0, Sdf.ValueBlock())
+    layer.Save()
+    second = run(first.output, tmp_path / "later.usda")
+    # The stage holds float32.
+    assert second.lights[0]["value"] == pytest.approx(first.lights[0]["value"], rel=2**-23)
+
+
 # -- who made it ---------------------------------------------------------------------------
 
 

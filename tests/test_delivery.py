@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,9 +11,10 @@ from builders import obj, png
 from overlaid import lamp, stage_file
 from pxr import Usd
 
+from hdrusd import delivery
 from hdrusd.conversion import Options
 from hdrusd.convert import convert
-from hdrusd.delivery import earlier_files
+from hdrusd.delivery import earlier_files, is_own
 from hdrusd.errors import InputError
 
 LAMP = lamp("SphereLight", "float inputs:intensity = 100\nfloat inputs:radius = 0.1")
@@ -109,16 +111,88 @@ def test_a_hand_written_stage_of_that_name_is_no_earlier_conversion(tmp_path: Pa
     for name in ("o.photometry.usda", "o.look.usda"):
         (tmp_path / name).write_text('#usda 1.0\ndef "mine" {}\n')
     assert earlier_files(tmp_path / "o.usda") == []
-    before = contents(tmp_path)
-    with pytest.raises(InputError, match=r"o\.photometry\.usda: not of an earlier conversion"):
-        convert(stage(tmp_path / "source"), tmp_path / "o.usda", Options())
-    (tmp_path / "o.photometry.usda").unlink()
-    (tmp_path / "o.look.usda").unlink()
-    (tmp_path / "o.look.usda").mkdir()
-    with pytest.raises(InputError, match=r"o\.look\.usda: not of an earlier conversion"):
-        convert(stage(tmp_path / "source"), tmp_path / "o.usda", Options())
-    assert contents(tmp_path / "source")  # and nothing else was made
-    assert before["o.usda"] == contents(tmp_path)["o.usda"]
+    convert(stage(tmp_path), tmp_path / "o.usda", Options())
+    assert (tmp_path / "o.look.usda").read_text() == '#usda 1.0\ndef "mine" {}\n'
+
+
+@pytest.mark.parametrize("layer", ["geometry.usdc", "look.usda"])
+def test_layers_that_nothing_says_hdrusd_wrote_stay(tmp_path: Path, out: Path, layer: str) -> None:
+    out.mkdir()
+    (out / f"o.{layer}").write_bytes(b"mine")
+    (out / f"p.{layer}").mkdir()
+    (out / "p.usda").touch()
+    before = contents(out)
+    for name in ("o", "p"):
+        with pytest.raises(InputError, match=rf"{name}\.{layer}: not of an earlier conversion"):
+            convert(plain(tmp_path), out / f"{name}.usda", Options())
+    assert contents(out) == before
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '(framesPerSecond = 24)\ndef Sphere "Ball" {}',
+        LAMP,  # no default prim
+        '(defaultPrim = "End")\n'
+        + "\n".join(LAMP.replace("Lamp", f"L{i}") for i in range(200))
+        + '\ndef Xform "End" {}',
+    ],
+    ids=["frames per second", "no default prim", "a late default prim"],
+)
+def test_a_stage_without_a_mark_can_be_converted_again(
+    tmp_path: Path, out: Path, text: str
+) -> None:
+    source = tmp_path / "source.usda"
+    head = "#usda 1.0\n" if text.startswith("(") else "#usda 1.0\n(metersPerUnit = 1)\n"
+    source.write_text(head + text)
+    for _ in range(2):
+        convert(source, out / "o.usda", Options())
+        assert is_own(out / "o.usda")
+        assert is_own(out / "o.photometry.usda")
+
+
+class Killed(BaseException):
+    """As by SIGKILL: what stands there stays, and nothing is put back."""
+
+
+@pytest.mark.parametrize("first", [None, plain, stage])
+@pytest.mark.parametrize("kind", [plain, stage])
+def test_output_can_be_made_after_a_kill_at_any_rename(
+    tmp_path: Path,
+    out: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    first: Callable[[Path], Path] | None,
+    kind: Callable[[Path], Path],
+) -> None:
+    rename = Path.rename
+    for turn in range(20):
+        if first is not None:
+            convert(first(tmp_path), out / "o.usda", Options())
+        left = turn
+
+        def killed(self: Path, target: Path) -> Path:
+            nonlocal left
+            left -= 1
+            if left < 0:
+                raise Killed if left == -1 else OSError
+            return rename(self, target)
+
+        with monkeypatch.context() as patched:
+            patched.setattr(Path, "rename", killed)
+            patched.setattr(delivery, "remove", lambda folder: None)
+            patched.setattr(delivery, "_clear", lambda folder: None)
+            try:
+                convert(kind(tmp_path), out / "o.usda", Options())
+            except Killed:
+                done = False
+            else:
+                done = True
+        convert(kind(tmp_path), out / "o.usda", Options())
+        assert Usd.Stage.Open(str(out / "o.usda")).GetPseudoRoot().GetChildren()
+        shutil.rmtree(out)
+        if done:
+            return
+    pytest.fail("more renames than turns")
 
 
 def test_a_source_made_of_what_would_go_is_refused(tmp_path: Path, out: Path) -> None:

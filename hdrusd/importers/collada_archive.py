@@ -12,6 +12,7 @@ import re
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import takewhile
 from urllib.parse import unquote
 
 from hdrusd.errors import InputError, SourceRef
@@ -49,7 +50,7 @@ class Archive:
         """The bytes of the member that the first of ``references`` names; None if none does.
 
         As written, relative to the document; else, with a finding, the only one of that path
-        or of that base name without regard to case.
+        or of the longest end of it without regard to case.
         """
         paths = [_path(self._folder, reference) for reference in references]
         path = next((path for path in paths if path in self._members), None)
@@ -57,7 +58,7 @@ class Archive:
             path = next((found for path in paths if (found := self._like(path))), None)
             if path is None:
                 return None
-            text = f"{references[0][:200]}: not in the archive as written; {path[:200]} is used"
+            text = f"{references[0][:200]}: not there, seen from the document; {path[:200]} is used"
             self._report.add(Kind.ASSUMED, "file-found-elsewhere", place, thing, text)
         return b"".join(self._pieces(self._members[path]))
 
@@ -80,11 +81,12 @@ class Archive:
         return list(self._pieces(self._members[path]))
 
     def _like(self, path: str) -> str | None:
-        """The only path that is like this one but for case; else that of the same base name."""
+        """The only path that is like this one but for case; else that which ends most like it."""
         for likes, alike in zip(self._likes, (str.casefold, _base), strict=True):
             found = likes.get(alike(path), [])
-            if found:
-                return found[0] if len(found) == 1 else None
+            ends = [_common_end(path, other) for other in found]
+            if ends and ends.count(max(ends)) == 1:
+                return found[ends.index(max(ends))]
         return None
 
     def _pieces(self, info: zipfile.ZipInfo) -> Iterator[bytes]:
@@ -114,6 +116,13 @@ def _path(folder: str, name: str) -> str:
 
 def _base(path: str) -> str:
     return posixpath.basename(path).casefold()
+
+
+def _common_end(one: str, other: str) -> int:
+    """How many names at the ends of two paths are the same but for case."""
+    names = (reversed(path.casefold().split("/")) for path in (one, other))
+    pairs = zip(*names, strict=False)
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
 
 
 def _grouped(paths: Iterable[str], alike: Callable[[str], str]) -> dict[str, list[str]]:

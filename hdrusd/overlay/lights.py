@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -413,7 +414,9 @@ def _brightest(prim: Usd.Prim) -> Usd.TimeCode:
     names = (light.INTENSITY, light.ILLUMINANCE, "inputs:intensity")
     for attribute in filter(None, map(prim.GetAttribute, names)):
         if times := attribute.GetTimeSamples():
-            return Usd.TimeCode(max(times, key=attribute.Get))
+            values = [attribute.Get(time) for time in times]  # None where a sample is blocked
+            known = [v if v is not None and math.isfinite(v) else -math.inf for v in values]
+            return Usd.TimeCode(times[known.index(max(known))])
     return Usd.TimeCode.Default()
 
 

@@ -61,6 +61,7 @@ _WORD = re.compile(r"[^\s,]+")
 
 #: A comma that is a separator to LM-63, and to some who write it the decimal sign.
 _COMMA = re.compile(r"\d,\d")
+_COMMAS = re.compile(r"\d,[^\s,]+,\d")
 _TYPES: dict[int, Type] = {1: "C", 2: "B", 3: "A"}
 
 #: Lines of one lamp's tilt: more angles than a goniometer has stops are no tilt.
@@ -408,9 +409,12 @@ class _Numbers:
         return InputError(self._line(offset), text)
 
     def _comma(self, end: int) -> tuple[str, SourceRef] | None:
-        """The first word with a comma between digits before ``end``, and its line."""
+        """The first word with a comma between digits before ``end``, and its line.
+
+        None where a word has several: there they stand between numbers.
+        """
         found = _COMMA.search(self.text, 0, end)
-        if found is None:
+        if found is None or _COMMAS.search(self.text, 0, end):
             return None
         near = self.text[max(found.start() - 12, 0) : found.end() + 12].split()
         return next(word for word in near if _COMMA.search(word)), self._line(found.start())

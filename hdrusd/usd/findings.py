@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 
 from pxr import Sdf, Usd
@@ -21,9 +22,17 @@ def first_place(prim: Usd.Prim) -> Sdf.Path:
     while prim.IsInPrototype():
         while not prim.IsPrototype():
             prim = prim.GetParent()
-        instance = min(prim.GetInstances(), key=Usd.Prim.GetPath)
+        instance = _first_instance(prim)
+        if not instance:  # gone since
+            _first_instance.cache_clear()
+            instance = _first_instance(prim)
         path, prim = path.ReplacePrefix(prim.GetPath(), instance.GetPath()), instance
     return path
+
+
+@lru_cache(maxsize=1024)  # there may be 100,000 instances, and a finding for each of many prims
+def _first_instance(prototype: Usd.Prim) -> Usd.Prim:
+    return min(prototype.GetInstances(), key=Usd.Prim.GetPath)
 
 
 def prim_finding(report: Report, prim: Usd.Prim, kind: Kind, code: str, text: str) -> None:

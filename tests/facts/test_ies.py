@@ -145,6 +145,15 @@ def test_commas_between_numbers_are_separators(between: str) -> None:
     assert report.codes() == set()
 
 
+def test_numbers_after_commas_that_stand_between_numbers_are_left() -> None:
+    """``0,45,90`` is no decimal number, so what follows was not made by commas."""
+    head, body = ies_text().split("TILT=NONE\n")
+    report = Report()
+    lamp = ies(f"{head}TILT=NONE\n{','.join(body.split())}\n1 2 3\n", report)
+    assert lamp.candela.tolist() == [list(row) for row in QUADRANT]
+    assert report.codes() == {"profile-trailing"}
+
+
 TILTED = "1\n3\n0 45 90\n0.9 0.95 1.2"
 
 

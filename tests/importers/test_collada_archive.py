@@ -105,3 +105,10 @@ def test_a_document_that_is_not_clear_is_told(tmp_path: Path, manifest: str) -> 
     assert (name, image.data) == ("first", b"red")
     (finding,) = [f for f in report if f.code == "collada-archive"]
     assert "of 2, a/model.dae is read" in finding.text
+
+
+def test_else_it_is_the_one_of_the_longest_end(tmp_path: Path) -> None:
+    members = {"m.dae": painted("x/Wood.png"), "a/x/wood.png": b"red", "b/wood.png": b"green"}
+    image, _, report = load(tmp_path / "m.zae", members)
+    assert image.data == b"red"
+    assert "file-found-elsewhere" in report.codes()
