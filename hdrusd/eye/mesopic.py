@@ -22,9 +22,9 @@ _ROD_WEIGHT = 683.0 / 1699.0
 #: m = _OFFSET + _SLOPE log10(Lm) (CIE 191:2010, eq. 3).
 _OFFSET, _SLOPE = 0.767, 0.3334
 
-#: How far m may be from its fixed point, and steps that suffice for ratios S/P of 0.26 and more.
-#: For less, m may settle slowly where it is nearly 0.
-_TOLERANCE, _STEPS = 1e-8, 500
+#: How far m may be from its fixed point, and steps that suffice for ratios S/P of 0.26 to 20.
+#: For less m may settle slowly where it is nearly 0, for more it may go to and fro: then halves.
+_TOLERANCE, _STEPS, _HALVES = 1e-8, 500, 40
 
 
 def mesopic(photopic: npt.ArrayLike, scotopic: npt.ArrayLike) -> tuple[Array, Array]:
@@ -32,7 +32,7 @@ def mesopic(photopic: npt.ArrayLike, scotopic: npt.ArrayLike) -> tuple[Array, Ar
 
     ``photopic`` cd/m2 and ``scotopic`` scotopic cd/m2, (...), not negative. From m = 0.5 on,
     Lm = (m Lp + (1 - m) Ls V'0) / (m + (1 - m) V'0) and m by its logarithm are repeated until
-    they agree. m is 0 below about 0.005 and 1 above 5 cd/m2.
+    they agree, or, where they do not come to that, halved down to it. m is 0 below about 0.005 and 1 above 5 cd/m2.
     """
     lp, ls = np.broadcast_arrays(np.asarray(photopic, np.float64), np.asarray(scotopic, np.float64))
     shape = lp.shape
@@ -45,7 +45,18 @@ def mesopic(photopic: npt.ArrayLike, scotopic: npt.ArrayLike) -> tuple[Array, Ar
         left = left[np.abs(m[left] - before) > _TOLERANCE]
         if not left.size:
             break
+    m[left] = _between(lp[left], ls[left])
     return _mixed(lp, ls, m).reshape(shape), m.reshape(shape)
+
+
+def _between(cones: Array, rods: Array) -> Array:
+    """Where Lm and m agree, by halves of 0 to 1: of deep blue light the steps go to and fro."""
+    low, high = np.zeros(cones.size), np.ones(cones.size)
+    for _ in range(_HALVES):
+        m = 0.5 * (low + high)
+        above = _coefficient(_mixed(cones, rods, m)) > m
+        low, high = np.where(above, m, low), np.where(above, high, m)
+    return 0.5 * (low + high)
 
 
 def _mixed(cones: Array, rods: Array, m: Array) -> Array:

@@ -34,6 +34,9 @@ MOST_VALUES = 1 << 21
 #: cd; more is no lamp, and times a multiplier would leave 32-bit floats.
 BRIGHTEST = 1e12
 
+#: Fewer are no lamp's, and what is a share of them would leave the numbers that there are.
+_LEAST_LUMENS = 1e-6
+
 #: Angles this near to the end of a range are meant to be it, degrees.
 _NEAR = 0.01
 
@@ -166,6 +169,8 @@ def checked(
         candela = np.where(negative, 0.0, candela)
     planes = _settled(at("planes", 0), type, planes)
     _ascending(at, "planes", "plane angles", planes, -widest, widest)  # its ends have moved
+    if lumens is not None and lumens < _LEAST_LUMENS:
+        lumens = None
     return Luminaire(name, type, planes, angles, candela, lumens, opening, keywords)
 
 

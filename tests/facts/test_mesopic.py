@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from hdrusd.colour import luminance
@@ -31,6 +31,7 @@ def test_published_fixed_points(lp: float, ls: float, lm: float, m: float) -> No
     assert [float(v) for v in mesopic(lp, ls)] == pytest.approx([lm, m], rel=1e-7)
 
 
+@example(2.0, 27.0)
 @given(LUMINANCES, RATIOS)
 def test_the_two_equations_of_the_standard_hold(lp: float, ratio: float) -> None:
     lm, m = (float(v) for v in mesopic(lp, lp * ratio))

@@ -190,6 +190,16 @@ def test_any_bytes(data: bytes) -> None:
     survives(b"TILT=NONE\n" + data)
 
 
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("word", [b"1e-308", b"1e308"])
+def test_each_word_replaced(seed: bytes, word: bytes) -> None:
+    """By numbers whose quotients and products leave all that there are."""
+    breaks = b"\r\n" if b"\r\n" in seed else b" "
+    parts = seed.replace(b"\n", b" \n ").split(b" ") if breaks == b" " else seed.split(breaks)
+    for index in range(min(len(parts), 60)):
+        survives(breaks.join([*parts[:index], word, *parts[index + 1 :]]))
+
+
 @settings(max_examples=60)
 @given(
     st.sampled_from(SEEDS),
