@@ -32,7 +32,8 @@ def mesopic(photopic: npt.ArrayLike, scotopic: npt.ArrayLike) -> tuple[Array, Ar
 
     ``photopic`` cd/m2 and ``scotopic`` scotopic cd/m2, (...), not negative. From m = 0.5 on,
     Lm = (m Lp + (1 - m) Ls V'0) / (m + (1 - m) V'0) and m by its logarithm are repeated until
-    they agree, or, where they do not come to that, halved down to it. m is 0 below about 0.005 and 1 above 5 cd/m2.
+    they agree, or, where they do not come to that, halved down to it. m is 0 below about 0.005
+    and 1 above 5 cd/m2.
     """
     lp, ls = np.broadcast_arrays(np.asarray(photopic, np.float64), np.asarray(scotopic, np.float64))
     shape = lp.shape
